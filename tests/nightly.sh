@@ -133,6 +133,8 @@ part_truth() {
     sized '2 30 1' '40 30 1' build/tests/truth_test_trust_c
     # The mean of an ensemble under a target against the mean of all its runs; scenes, seed, runs of each. 300 s
     sized '2 3 100' '80 3 100' build/tests/truth_test_ensemble_c
+    # Periodic orbits of drawn scenes: stable ones attract, unstable ones repel; orbits, seed. 15 s
+    sized '12 7' '600 7' build/tests/truth_test_orbits_c
     # Force traces: how often the stated interval of T_c holds it, in 92 to 98 % of a cell's trials; trials, seed. 800 s
     sized '4 1' '400 1' build/tests/truth_test_traces_c
 }

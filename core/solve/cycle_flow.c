@@ -11,7 +11,7 @@
 #include "core/math/linear_system.h"
 #include "core/solve/linearised_motion.h"
 
-enum { SHIFTS = 16 };
+enum { PARTS = 16 }; // of a cycle, at which the section may be
 
 struct CycleFlow {
     EventEngine engine;
@@ -21,7 +21,7 @@ struct CycleFlow {
     Base base;
     Plan *plan;
     double period; // [s]
-    double shift;  // of the section after the zero crossing [s]
+    int part;      // of the cycle, at which the section is
     double *kept;  // q and p
     DamperState *kept_dampers;
 };
@@ -131,6 +131,10 @@ static Status cycle_flow_cross(CycleFlow *flow, double time) {
     return STATUS_OK;
 }
 
+static double cycle_flow_part_time(const CycleFlow *flow, int part) {
+    return flow->period * part / PARTS;
+}
+
 Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t count,
                       CycleMotion *motion) {
     ModalState *state = &flow->engine.state;
@@ -143,9 +147,10 @@ Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t co
     linearised->peak = 0;
     memset(linearised->squares, 0, state->storey_count * sizeof *linearised->squares);
     Status status = STATUS_OK;
+    const double start = cycle_flow_part_time(flow, flow->part);
     for (size_t i = 0; i < cycles && status == STATUS_OK; i++) {
-        state->offset = flow->shift;
-        status = cycle_flow_cross(flow, flow->shift + flow->period);
+        state->offset = start;
+        status = cycle_flow_cross(flow, start + flow->period);
     }
     linearised->count = 0;
     linearised->is_measured = false;
@@ -167,28 +172,21 @@ bool cycle_flow_is_linearised(const CycleFlow *flow) {
     return flow->plan->form != CONTACT_POWER;
 }
 
-Status cycle_flow_shift(CycleFlow *flow, bool is_home, bool *is_found) {
-    ModalState *state = &flow->engine.state;
-    *is_found = true;
-    if (is_home) {
-        state->offset = flow->shift;
-        if (flow->shift > 0)
-            TRY(cycle_flow_cross(flow, flow->period));
-        flow->shift = 0;
-        return STATUS_OK;
+bool cycle_flow_is_flying(const CycleFlow *flow) {
+    const ModalState *state = &flow->engine.state;
+    for (size_t d = 0; d < state->dampers; d++)
+        if (state->damper[d].phase != PHASE_FLIGHT)
+            return false;
+    return true;
+}
+
+Status cycle_flow_shift(CycleFlow *flow, bool is_home) {
+    for (int i = 0; i < PARTS && (is_home ? flow->part > 0 : !cycle_flow_is_flying(flow)); i++) {
+        flow->engine.state.offset = cycle_flow_part_time(flow, flow->part);
+        flow->part++;
+        TRY(cycle_flow_cross(flow, cycle_flow_part_time(flow, flow->part)));
+        flow->part %= PARTS;
     }
-    state->offset = flow->shift = 0;
-    for (int i = 0; i < SHIFTS; i++) {
-        size_t flying = 0;
-        for (size_t d = 0; d < state->dampers; d++)
-            flying += state->damper[d].phase == PHASE_FLIGHT;
-        if (flying == state->dampers)
-            return STATUS_OK;
-        const double next = flow->period * (i + 1) / SHIFTS;
-        TRY(cycle_flow_cross(flow, next));
-        flow->shift = i + 1 < SHIFTS ? next : 0;
-    }
-    *is_found = false;
     return STATUS_OK;
 }
 
@@ -227,8 +225,8 @@ double cycle_flow_undamped_peak(const CycleFlow *flow) {
     return isfinite(most) ? most : (double)NAN;
 }
 
-double cycle_flow_steps(const CycleFlow *flow) {
-    return flow->run.steps;
+double cycle_flow_period(const CycleFlow *flow) {
+    return flow->period;
 }
 
 // The storeys' state becomes the plan's initial one.
@@ -302,6 +300,7 @@ Status cycle_flow_new(const CycleFlowInputs *inputs, const CycleFlow *from, Cycl
     flow->plan->sample_rate = 1 / inputs->period;
     flow->plan->duration = inputs->period;
     flow->plan->count = 2;
+    flow->part = from != NULL ? from->part : 0;
     flow->response.is_unlisted = true;
     flow->run = (Run){.plan = flow->plan,
                       .base = &flow->base,

@@ -50,9 +50,12 @@ Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t co
 // speed.
 bool cycle_flow_is_linearised(const CycleFlow *flow);
 
-// Moves the section within the cycle, from where all masses are in flight (at most a cycle on) or,
-// if `is_home`, back to the zero crossing. False: none was found.
-Status cycle_flow_shift(CycleFlow *flow, bool is_home, bool *is_found);
+// Whether all masses are in flight now.
+bool cycle_flow_is_flying(const CycleFlow *flow);
+
+// Moves on to another section in the cycle: where all masses are in flight, if there is one within
+// a cycle, or, if `is_home`, the zero crossing.
+Status cycle_flow_shift(CycleFlow *flow, bool is_home);
 
 // Displacement and velocity of the top storey [m], [m/s].
 void cycle_flow_top(const CycleFlow *flow, double *displacement, double *velocity);
@@ -60,6 +63,6 @@ void cycle_flow_top(const CycleFlow *flow, double *displacement, double *velocit
 // Largest displacement of any storey in the steady state without dampers; NAN: there is none [m].
 double cycle_flow_undamped_peak(const CycleFlow *flow);
 
-double cycle_flow_steps(const CycleFlow *flow); // solver steps so far
+double cycle_flow_period(const CycleFlow *flow); // of the sine [s]
 
 #endif

@@ -181,6 +181,11 @@ static bool event_engine_is_suppressed(ModalState *state) {
     return true;
 }
 
+// The run and what is linearised beside it.
+static double event_engine_motions(const EventEngine *engine) {
+    return 1 + (engine->linearised != NULL ? (double)engine->linearised->count : 0);
+}
+
 // One step of at most `length`, up to the first event.
 static Status event_engine_advance(EventEngine *engine, double length) {
     ModalState *state = &engine->state;
@@ -206,7 +211,7 @@ static Status event_engine_advance(EventEngine *engine, double length) {
     if (is_event)
         TRY(event_engine_apply(engine, &event));
     return event_engine_count_steps(
-        engine, event_engine_cost(engine, STEP_WORK_ARC) +
+        engine, event_engine_cost(engine, STEP_WORK_ARC) * event_engine_motions(engine) +
                     (is_event ? event_engine_cost(engine, STEP_WORK_EVENT) : 0));
 }
 

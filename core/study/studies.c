@@ -2,7 +2,8 @@
 #include "core/study/study.h"
 
 const StudyKind *const studies[] = {
-    &study_tradeoff, &study_ensemble, &study_compare, &study_sensitivity, &study_sweep, NULL,
+    &study_tradeoff, &study_ensemble, &study_compare, &study_sensitivity,
+    &study_sweep,    &study_response, NULL,
 };
 
 static const Kind *studies_kind(size_t index) {

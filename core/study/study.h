@@ -172,7 +172,7 @@ struct StudyKind {
 extern const StudyKind *const studies[]; // NULL-terminated
 extern const KindTable study_kinds, study_answer_kinds;
 extern const StudyKind study_tradeoff, study_ensemble, study_compare, study_sensitivity,
-    study_sweep, study_calibrate;
+    study_sweep, study_calibrate, study_response;
 
 static inline const StudyKind *study_kind(const Variant *study) {
     return (const StudyKind *)(const void *)study->kind;

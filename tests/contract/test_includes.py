@@ -59,7 +59,7 @@ BANNED = {
     r"sqlite3_\w+": ("SQLite is db/sqlite.c's", ["server/db/sqlite.c"]),
     r"MHD_\w+": ("libmicrohttpd is http's", MHD_FILES),
     r"fftw_\w+": ("FFTW is fft.c's", ["core/math/fft.c"]),
-    r"LAPACKE_\w+": ("LAPACK is symmetric_matrix.c's", ["core/math/symmetric_matrix.c"]),
+    r"LAPACKE_\w+": ("LAPACK is core/math's", ["core/math/symmetric_matrix.c", "core/math/eigenvalues.c"]),
     r"gnutls_\w+": ("GnuTLS is sha256.c's and tls.c's", ["server/util/sha256.c", "server/http/tls.c"]),
     r"libdeflate_\w+": ("libdeflate is gzip.c's", ["server/util/gzip.c"]),
     r"curl_\w+": ("libcurl is cli/client.c's", ["server/cli/client.c"]),

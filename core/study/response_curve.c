@@ -1,0 +1,634 @@
+// The points are made one after the other, each from the state in which the one before it ended, so
+// that a branch is kept as long as it attracts: up and down differ where there is hysteresis.
+//
+// Continuation follows a branch by pseudo-arclength (Keller 1977): with z the scaled state and
+// value, t the tangent and h the step, the next point z satisfies
+//
+//     P(z) = y   and   t . (z - z0) = h,
+//
+// which has a solution also at a fold.
+#include "core/study/response_curve.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/json_pointer.h"
+#include "core/math/linear_system.h"
+#include "core/study/periodic_orbit.h"
+#include "core/study/sweep.h"
+
+enum {
+    CURVE_BRANCHES = 64, // continued
+    CURVE_FACTOR = 4,    // points of the continuation over those of the axis
+    CURVE_CORRECTIONS = 8,
+    CURVE_EASY = 4,        // corrections after which the step grows
+    CURVE_WANDER_MIN = 32, // cycles of a motion without a period
+};
+
+static const double CURVE_STEP = 0.02, CURVE_STEP_MIN = 1e-5, CURVE_STEP_MAX = 0.05;
+static const double CURVE_PRECISION = 1e-10;
+static const double CURVE_DIFFERENCE = 1e-7; // of the value, over the axis's range
+static const double CURVE_JUMP = 0.5;        // between points: another branch
+static const double CURVE_MARGIN = 1e-9;     // of the largest multiplier below 1, if stable
+static const double CURVE_ALIKE = 0.01;      // peaks of one branch
+
+static const char *const curve_direction_names[] = {"up", "down", "both", NULL};
+
+// clang-format off
+static const Field response_study_fields[] = {
+    FIELD_ITEM(ResponseStudy, axis, study_axis_fields, NULL, PRESENCE_REQUIRED, "the number that varies: a range of from, to and count; the exact solver is used whatever the scene's solver is"),
+    FIELD_CHOICE(ResponseStudy, direction, curve_direction_names, CURVE_UP, "up: from, then on to to, each point from the state of the one before; down: the reverse; both: up, then down"),
+    FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic; fewer where a stable orbit is found earlier"),
+    FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CURVE_PERIOD), 8, "longest period searched for, in cycles of the sine"),
+    FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits"),
+    FIELD_COUNT(ResponseStudy, section_points, NULL, WITHIN(0, CURVE_SECTION), 64, "points of the section where no periodic orbit is found"),
+    FIELD_BASE(ResponseStudy, names, study_names_fields),
+    FIELD_END
+};
+
+const Field response_point_fields[] = {
+    FIELD_COUNT(ResponsePoint, index, NULL, AT_MIN(0), OPTIONAL, "number of the point, from 0"),
+    FIELD_COUNT(ResponsePoint, branch, NULL, AT_MIN(1), OPTIONAL, "number of the curve that it is on, from 1"),
+    FIELD_REAL(ResponsePoint, value, NULL, ANY, OPTIONAL, "of the axis"),
+    FIELD_CHOICE(ResponsePoint, direction, curve_direction_names, OPTIONAL, "in which the axis was followed; absent in a continuation"),
+    FIELD_COUNT(ResponsePoint, period, NULL, AT_MIN(1), OPTIONAL, "in cycles of the sine; null: no periodic orbit found"),
+    FIELD_COUNT(ResponsePoint, impacts_per_period, NULL, AT_MIN(0), OPTIONAL, "of all dampers"),
+    FIELD_FLAG(ResponsePoint, stable, false, "all multipliers are below 1 in magnitude; false also where one is 1, as of a mass that touches no stop"),
+    FIELD_ROWS(ResponsePoint, multipliers, NULL, ANY, 0, PRESENCE_OPTIONAL, "Floquet multipliers, real and imaginary part, the largest first"),
+    FIELD_REAL(ResponsePoint, peak_displacement, "m", ANY, OPTIONAL, "largest displacement of any storey over the period or the section's cycles, also between events"),
+    FIELD_REAL(ResponsePoint, rms_displacement, "m", ANY, OPTIONAL, "root mean square over the same time, the largest of all storeys"),
+    FIELD_REAL(ResponsePoint, undamped_peak_displacement, "m", ANY, OPTIONAL, "largest displacement of any storey in the steady state without dampers"),
+    FIELD_ROWS(ResponsePoint, section, NULL, ANY, 0, PRESENCE_OPTIONAL, "displacement and velocity of the top storey at the upward zero crossings of the sine, where no period is found"),
+    FIELD_REAL(ResponsePoint, lyapunov, "1/s", ANY, OPTIONAL, "largest Lyapunov exponent over the section's cycles, where no period is found; null where contact parameters depend on the approach speed"),
+    FIELD_END
+};
+
+static const Field response_failure_fields[] = {
+    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
+    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "points that failed for this reason"),
+    {.name = "first_point", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "index of the first of them"},
+    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
+    FIELD_END
+};
+
+static const Field response_answer_fields[] = {
+    FIELD_COUNT(ResponseCurve, runs, NULL, AT_MIN(0), 0, "points made"),
+    FIELD_COUNT(ResponseCurve, failed, NULL, AT_MIN(0), 0, "of these without a result"),
+    FIELD_LIST(ResponseCurve, failures, response_failure_fields, 0, PRESENCE_DEFAULT, "points that failed, by their reason"),
+    FIELD_LIST(ResponseCurve, points, response_point_fields, 0, PRESENCE_DEFAULT, "in the order in which they were made, and along each curve of a continuation"),
+    FIELD_LIST(ResponseCurve, warnings, warning_fields, 0, PRESENCE_DEFAULT, "limits that were met"),
+    FIELD_END
+};
+// clang-format on
+
+// A periodic orbit at which a branch begins.
+typedef struct CurveStart {
+    CycleFlow *flow;
+    double value;
+    size_t point;
+} CurveStart;
+
+typedef struct CurveWork {
+    StudyWork work;
+    const ResponseStudy *study;
+    ResponseCurve *answer;
+    const StudyTools *tools;
+    Problem *problem;
+    ProgressRange range;
+    Progress progress; // of the runs: at the fraction of the points made
+    OrbitSearch search;
+    CycleFlow *flow; // at the last point
+    uint64_t branch; // so far
+    CurveStart starts[CURVE_BRANCHES];
+    size_t start_count;
+    // Of a continuation; vectors have a number for the value behind the scaled state.
+    double *block, *z, *at, *tangent, *by_value, *matrix;
+} CurveWork;
+
+static double curve_frequency(const Simulation *simulation) {
+    return ((const ExcitationSine *)(const void *)scene_excitation(&simulation->scene))->frequency;
+}
+
+// Numbers of the state; the exact one is known after the plan.
+static size_t curve_state_size(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const size_t storeys = structure_storeys(scene_structure(scene));
+    return 2 * (accuracy_modes((const Accuracy *)(const void *)simulation->accuracy, storeys) +
+                scene->dampers.count);
+}
+
+static Status curve_check_axis(const StudyAxis *axis, const Simulation *simulation,
+                               Problem *problem) {
+    static const char place[] = "/study/axis";
+    bool is_tag;
+    Simulation scene;
+    TRY(study_axis_check(axis, true, place, problem));
+    if (axis->values.count > 0)
+        return problem_add(problem, STATUS_INVALID, "/study/axis/values",
+                           "cannot be followed up and down: give from, to and count");
+    if (axis->count > CURVE_VALUES)
+        return problem_add_real(problem, STATUS_INVALID, "/study/axis/count", (double)axis->count,
+                                NULL, "must be at most %d", CURVE_VALUES);
+    if (!(axis->from < axis->to))
+        return problem_add(problem, STATUS_INVALID, place,
+                           "from must be below to: direction down follows it in reverse");
+    TRY(fields_copy(simulation_fields, simulation, &scene));
+    const Field *field = study_axis_find(axis, &scene, &is_tag, place, problem);
+    simulation_clear(&scene);
+    if (field == NULL)
+        return STATUS_INVALID;
+    if (field->kind != FIELD_KIND_REAL && field->kind != FIELD_KIND_REALS)
+        return json_pointer_fault(problem, place, "pointer",
+                                  "must be that of a real number: only such a number can vary "
+                                  "continuously");
+    return STATUS_OK;
+}
+
+static Status curve_complete(void *request, const Simulation *simulation,
+                             const SimulationLimits *limits, Problem *problem) {
+    const ResponseStudy *study = request;
+    const ExcitationKind *kind = excitation_kind(scene_excitation(&simulation->scene));
+    Status status = STATUS_OK;
+    (void)limits;
+    if (kind != &excitation_sine)
+        status = problem_add(problem, STATUS_INVALID, "/study/kind",
+                             "response needs the cycles of a sine: /excitation/kind must be sine, "
+                             "is %s",
+                             kind->kind.name);
+    if (curve_state_size(simulation) > CURVE_STATE)
+        status = problem_add(problem, STATUS_INVALID, "/study/kind",
+                             "response follows the modes and dampers with all their changes: their "
+                             "number must be at most %d, is %zu; keep fewer modes by "
+                             "/accuracy/modes",
+                             CURVE_STATE / 2, curve_state_size(simulation) / 2);
+    return study_first_failure(curve_check_axis(&study->axis, simulation, problem), status);
+}
+
+static void curve_references(void *request, StudyReferences *references) {
+    ResponseStudy *study = request;
+    *references = (StudyReferences){.names = &study->names}; // the axis has numbers
+}
+
+static size_t curve_points(const ResponseStudy *study) {
+    return (size_t)study->axis.count * (study->direction == CURVE_BOTH ? 2 : 1);
+}
+
+static size_t curve_wander_cycles(const ResponseStudy *study) {
+    return study->section_points > CURVE_WANDER_MIN ? (size_t)study->section_points
+                                                    : CURVE_WANDER_MIN;
+}
+
+// As if no point had a period, and with the columns of the linearised motion.
+static Status curve_cost(const void *request, const Simulation *simulation,
+                         const SimulationLimits *limits, double *steps) {
+    const ResponseStudy *study = request;
+    const double cycle = simulation_cost(simulation).steps /
+                         fmax(simulation->scene.duration * curve_frequency(simulation), 1);
+    const double columns = 1 + (double)curve_state_size(simulation);
+    double cycles = (double)study->settle_cycles + 2 * (double)curve_wander_cycles(study) +
+                    4 * columns * (double)study->max_period;
+    cycles *= (double)curve_points(study);
+    if (study->continuation)
+        cycles += (double)study->axis.count * CURVE_FACTOR * 4 * columns * 2;
+    (void)limits;
+    *steps = cycles * cycle;
+    return STATUS_OK;
+}
+
+// The flow of the scene with this value. NULL in *flow: it failed, and `status` is the reason.
+static Status curve_make_flow(CurveWork *work, double value, const CycleFlow *from,
+                              CycleFlow **flow) {
+    const StudyAxes axes = {(StudyAxis *)(void *)&work->study->axis, 1};
+    const StudyValue values[] = {{NULL, value}};
+    Simulation scene;
+    *flow = NULL;
+    Status status = study_scene_make(work->work.simulation, &axes, values, &work->study->names,
+                                     true, work->tools->limits, &scene, work->problem);
+    if (status == STATUS_OK)
+        status = simulation_cycle_flow(&scene, work->tools->limits, &work->progress, from, flow,
+                                       work->problem);
+    simulation_clear(&scene);
+    return status;
+}
+
+static Status curve_make_search(CurveWork *work, size_t size) {
+    if (work->search.size == size)
+        return STATUS_OK;
+    orbit_search_clear(&work->search);
+    return orbit_search_make(&work->search, size, (size_t)work->study->max_period);
+}
+
+static Status curve_add_row(double a, double b, Rows *rows) {
+    Reals *row = list_append(rows, sizeof *row);
+    TRY(status_made(row != NULL));
+    return study_copy_reals((const double[]){a, b}, 2, row);
+}
+
+static ResponsePoint *curve_add_point(CurveWork *work, double value, int direction) {
+    ResponsePoint *point = list_grow(&work->answer->points, sizeof *point);
+    if (point == NULL)
+        return NULL;
+    (void)fields_default(response_point_fields, point);
+    point->value = value;
+    point->direction = direction;
+    work->answer->runs++;
+    return point;
+}
+
+// Of the orbit in the search, at which the flow is.
+static Status curve_fill_orbit(CurveWork *work, CycleFlow *flow, size_t period,
+                               ResponsePoint *point) {
+    const OrbitSearch *search = &work->search;
+    CycleMotion motion;
+    TRY(cycle_flow_run(flow, period, NULL, 0, &motion));
+    const double radius = orbit_search_radius(search);
+    point->period = period;
+    point->impacts_per_period = motion.impacts;
+    point->stable = radius < 1 - CURVE_MARGIN;
+    for (size_t i = 0; i < search->size && !isnan(radius); i++)
+        TRY(curve_add_row(search->real[i], search->imaginary[i], &point->multipliers));
+    point->peak_displacement = motion.peak_displacement;
+    point->rms_displacement = motion.rms_displacement;
+    point->undamped_peak_displacement = cycle_flow_undamped_peak(flow);
+    return STATUS_OK;
+}
+
+static Status curve_fill_section(CurveWork *work, CycleFlow *flow, double period,
+                                 ResponsePoint *point) {
+    const size_t points = (size_t)work->study->section_points;
+    double(*section)[2] = calloc(points + 1, sizeof *section), exponent;
+    TRY(status_made(section != NULL));
+    CycleMotion motion;
+    Status status = orbit_search_wander(&work->search, flow, curve_wander_cycles(work->study),
+                                        &exponent, points, section, &motion);
+    point->peak_displacement = motion.peak_displacement;
+    point->rms_displacement = motion.rms_displacement;
+    point->undamped_peak_displacement = cycle_flow_undamped_peak(flow);
+    point->lyapunov = exponent / period;
+    for (size_t i = 0; i < points && status == STATUS_OK; i++)
+        status = curve_add_row(section[i][0], section[i][1], &point->section);
+    free(section);
+    return status;
+}
+
+// A new branch begins where the kind of motion changes, or its state jumps.
+static Status curve_find_branch(CurveWork *work, CycleFlow *flow, size_t number, double jump) {
+    ResponsePoint *point = &work->answer->points.at[number];
+    const ResponsePoint *last = number > 0 ? point - 1 : NULL;
+    if (last == NULL || last->direction != point->direction || last->period != point->period ||
+        last->impacts_per_period != point->impacts_per_period ||
+        (point->period != COUNT_ABSENT && jump > CURVE_JUMP))
+        work->branch++;
+    point->branch = work->branch;
+    if (!work->study->continuation || point->period == COUNT_ABSENT ||
+        work->start_count == CURVE_BRANCHES ||
+        (work->start_count > 0 &&
+         work->answer->points.at[work->starts[work->start_count - 1].point].branch == work->branch))
+        return STATUS_OK;
+    CurveStart *start = &work->starts[work->start_count];
+    TRY(curve_make_flow(work, point->value, flow, &start->flow));
+    start->value = point->value;
+    start->point = number;
+    work->start_count++;
+    return STATUS_OK;
+}
+
+static Status curve_make_point(CurveWork *work, CycleFlow *flow, size_t number) {
+    OrbitSearch *search = &work->search;
+    size_t period;
+    double before[CURVE_STATE], jump = 0;
+    TRY(curve_make_search(work, cycle_flow_size(flow)));
+    cycle_flow_get(flow, before);
+    TRY(orbit_search_settle(search, flow, (size_t)work->study->settle_cycles, &period,
+                            work->problem));
+    ResponsePoint *point = &work->answer->points.at[number];
+    if (period > 0) {
+        for (size_t i = 0; i < search->size && cycle_flow_is_linearised(flow); i++)
+            jump = fmax(jump, fabs(search->y[i] - before[i]) / search->scales[i]);
+        TRY(curve_fill_orbit(work, flow, period, point));
+        TRY(curve_find_branch(work, flow, number, jump));
+        return cycle_flow_shift(flow, true);
+    }
+    TRY(cycle_flow_shift(flow, true));
+    TRY(curve_fill_section(work, flow, cycle_flow_period(flow), point));
+    return curve_find_branch(work, flow, number, 0);
+}
+
+// A failure of a point is counted and leaves its row without numbers.
+static Status curve_fail(CurveWork *work, Status status, size_t number) {
+    if (study_run_ends_study(status) || status == STATUS_OK)
+        return status;
+    ResponsePoint *point = &work->answer->points.at[number];
+    ResponsePoint empty;
+    (void)fields_default(response_point_fields, &empty);
+    empty.value = point->value;
+    empty.direction = point->direction;
+    empty.branch = ++work->branch;
+    fields_clear(response_point_fields, point);
+    *point = empty;
+    work->answer->failed++;
+    status =
+        study_failures_add(&work->answer->failures, (int)status,
+                           sweep_status_names[sweep_status(status)], number, work->problem->detail);
+    problem_clear(work->problem);
+    return status;
+}
+
+static Status curve_advance(CurveWork *work) {
+    const ResponseStudy *study = work->study;
+    const double all = (double)curve_points(study) +
+                       (study->continuation ? CURVE_FACTOR * (double)study->axis.count : 0);
+    work->range.from = fmin((double)work->answer->points.count / all, 1);
+    return study_advance(work->tools->progress, work->range.from, work->problem);
+}
+
+static Status curve_sweep(CurveWork *work, CurveDirection direction) {
+    const StudyAxis *axis = &work->study->axis;
+    for (size_t i = 0; i < axis->count; i++) {
+        const size_t number = work->answer->points.count;
+        const double value =
+            study_axis_value(axis, direction == CURVE_UP ? i : (size_t)axis->count - 1 - i).number;
+        CycleFlow *flow;
+        TRY(curve_advance(work));
+        TRY(status_made(curve_add_point(work, value, direction) != NULL));
+        Status status = curve_make_flow(work, value, work->flow, &flow);
+        if (status == STATUS_OK)
+            status = curve_make_point(work, flow, number);
+        if (status == STATUS_OK) {
+            cycle_flow_free(work->flow);
+            work->flow = flow;
+            continue;
+        }
+        cycle_flow_free(flow);
+        TRY(curve_fail(work, status, number));
+    }
+    return STATUS_OK;
+}
+
+// --- continuation ---
+
+static double curve_span(const CurveWork *work) {
+    return work->study->axis.to - work->study->axis.from;
+}
+
+// The return map and its derivatives at work->z. *change is that by the map, NAN if it failed;
+// *made is the flow there, with the contact states of `from`.
+static Status curve_evaluate(CurveWork *work, const CycleFlow *from, size_t period, double *change,
+                             CycleFlow **made) {
+    OrbitSearch *search = &work->search;
+    const size_t n = search->size;
+    double end[CURVE_STATE];
+    CycleFlow *beside = NULL;
+    *change = (double)NAN;
+    Status status = curve_make_flow(work, work->z[n] * curve_span(work), from, made);
+    if (status == STATUS_OK)
+        status = curve_make_flow(work, (work->z[n] + CURVE_DIFFERENCE) * curve_span(work), from,
+                                 &beside);
+    if (status == STATUS_OK && cycle_flow_size(*made) == n && cycle_flow_size(beside) == n) {
+        for (size_t i = 0; i < n; i++)
+            search->y[i] = work->z[i] * search->scales[i];
+        cycle_flow_keep(beside);
+        (void)orbit_search_map(search, beside, period, false, &status);
+        memcpy(end, search->end, n * sizeof *end);
+        cycle_flow_keep(*made);
+        if (status == STATUS_OK)
+            *change = orbit_search_map(search, *made, period, true, &status);
+        for (size_t i = 0; i < n; i++)
+            work->by_value[i] = (end[i] - search->end[i]) / search->scales[i] / CURVE_DIFFERENCE;
+        cycle_flow_restore(*made);
+        cycle_flow_set(*made, search->y);
+    }
+    cycle_flow_free(beside);
+    if (study_run_ends_study(status))
+        return status;
+    problem_clear(work->problem);
+    return STATUS_OK;
+}
+
+// Solves (I - P') x - P_value x_value = right, tangent . x = last for `right`, whose last is given.
+static bool curve_solve(CurveWork *work, double *right) {
+    const size_t n = work->search.size, m = n + 1;
+    for (size_t i = 0; i < n; i++) {
+        for (size_t k = 0; k < n; k++)
+            work->matrix[i * m + k] = (i == k) - work->search.matrix[i * n + k];
+        work->matrix[i * m + n] = -work->by_value[i];
+    }
+    memcpy(work->matrix + n * m, work->tangent, m * sizeof *right);
+    return linear_system_solve(work->matrix, right, m, 1);
+}
+
+// Turns the tangent to that of the curve at the last evaluation, in the direction so far.
+static bool curve_turn(CurveWork *work) {
+    const size_t n = work->search.size;
+    double next[CURVE_STATE + 1] = {0}, size = 0;
+    next[n] = 1;
+    if (!curve_solve(work, next))
+        return false;
+    for (size_t i = 0; i <= n; i++)
+        size += next[i] * next[i];
+    for (size_t i = 0; i <= n; i++)
+        work->tangent[i] = next[i] / sqrt(size);
+    return isfinite(size);
+}
+
+// Newton's method from work->at + step tangent. *count is that of the corrections; *made is NULL if
+// they failed.
+static Status curve_correct(CurveWork *work, const CycleFlow *from, size_t period, double step,
+                            int *count, CycleFlow **made) {
+    const OrbitSearch *search = &work->search;
+    const size_t n = search->size;
+    for (size_t i = 0; i <= n; i++)
+        work->z[i] = work->at[i] + step * work->tangent[i];
+    for (*count = 0; *count < CURVE_CORRECTIONS; ++*count) {
+        double change, right[CURVE_STATE + 1], most = 0;
+        TRY(curve_evaluate(work, from, period, &change, made));
+        if (change <= CURVE_PRECISION)
+            return STATUS_OK;
+        cycle_flow_free(*made);
+        *made = NULL;
+        if (!(change < 1))
+            return STATUS_OK;
+        for (size_t i = 0; i < n; i++)
+            right[i] = (search->end[i] - search->y[i]) / search->scales[i];
+        right[n] = 0;
+        if (!curve_solve(work, right))
+            return STATUS_OK;
+        for (size_t i = 0; i <= n; i++) {
+            work->z[i] += right[i];
+            most = fmax(most, fabs(right[i]));
+        }
+        if (!(most < 1))
+            return STATUS_OK;
+    }
+    return STATUS_OK;
+}
+
+static size_t curve_continued_max(const CurveWork *work) {
+    return curve_points(work->study) + CURVE_FACTOR * (size_t)work->study->axis.count;
+}
+
+// Follows the branch of an orbit to one side until it leaves the axis or is lost.
+static Status curve_follow(CurveWork *work, const CurveStart *start, size_t period, double side) {
+    OrbitSearch *search = &work->search;
+    const size_t n = search->size;
+    const double from = work->study->axis.from / curve_span(work),
+                 to = work->study->axis.to / curve_span(work);
+    CycleFlow *flow = NULL;
+    double step = CURVE_STEP, change;
+    cycle_flow_get(start->flow, work->z);
+    for (size_t i = 0; i < n; i++) {
+        work->z[i] /= search->scales[i];
+        work->tangent[i] = 0;
+    }
+    work->z[n] = start->value / curve_span(work);
+    work->tangent[n] = side;
+    TRY(curve_evaluate(work, start->flow, period, &change, &flow));
+    Status status = STATUS_OK;
+    bool goes_on = change <= 100 * CURVE_PRECISION && curve_turn(work);
+    memcpy(work->at, work->z, (n + 1) * sizeof *work->at);
+    while (goes_on && status == STATUS_OK && step >= CURVE_STEP_MIN &&
+           work->answer->points.count + 1 < curve_continued_max(work)) {
+        int count;
+        CycleFlow *next = NULL;
+        status = curve_advance(work);
+        if (status == STATUS_OK)
+            status = curve_correct(work, flow, period, step, &count, &next);
+        if (next == NULL) {
+            step /= 2;
+            continue;
+        }
+        cycle_flow_free(flow);
+        flow = next;
+        const double value = work->z[n];
+        goes_on = value >= from && value <= to;
+        memcpy(work->at, work->z, (n + 1) * sizeof *work->at);
+        step = count < CURVE_EASY ? fmin(1.5 * step, CURVE_STEP_MAX) : step / 2;
+        if (!goes_on || status != STATUS_OK)
+            break;
+        ResponsePoint *point = curve_add_point(work, value * curve_span(work), CHOICE_ABSENT);
+        status = status_made(point != NULL);
+        if (status == STATUS_OK)
+            status = orbit_search_multiply(search);
+        goes_on = curve_turn(work);
+        if (status == STATUS_OK)
+            point->branch = work->branch;
+        if (status == STATUS_OK)
+            status = curve_fill_orbit(work, flow, period, point);
+        cycle_flow_restore(flow);
+        cycle_flow_set(flow, search->y);
+    }
+    cycle_flow_free(flow);
+    if (status == STATUS_OK || study_run_ends_study(status))
+        return status;
+    problem_clear(work->problem);
+    return STATUS_OK;
+}
+
+// Whether a curve that is continued already goes through the orbit at which a branch begins.
+static bool curve_is_followed(const CurveWork *work, const ResponsePoint *begin) {
+    const ResponsePoints *points = &work->answer->points;
+    for (size_t i = curve_points(work->study); i + 1 < points->count; i++) {
+        const ResponsePoint *a = &points->at[i], *b = a + 1;
+        const double part = (begin->value - a->value) / (b->value - a->value);
+        if (a->branch != b->branch || a->period != begin->period ||
+            a->impacts_per_period != begin->impacts_per_period || !(part >= 0 && part <= 1))
+            continue;
+        const double peak =
+            a->peak_displacement + part * (b->peak_displacement - a->peak_displacement);
+        if (fabs(peak - begin->peak_displacement) <= CURVE_ALIKE * begin->peak_displacement)
+            return true;
+    }
+    return false;
+}
+
+static void curve_reverse(ResponsePoints *points, size_t first) {
+    for (size_t i = first, k = points->count; i + 1 < k; i++) {
+        const ResponsePoint kept = points->at[i];
+        points->at[i] = points->at[--k];
+        points->at[k] = kept;
+    }
+}
+
+static Status curve_continue(CurveWork *work, const CurveStart *start) {
+    ResponsePoints *points = &work->answer->points;
+    const ResponsePoint begin = points->at[start->point];
+    const size_t first = points->count, period = (size_t)begin.period;
+    if (curve_is_followed(work, &begin) || first >= curve_continued_max(work))
+        return STATUS_OK;
+    TRY(curve_make_search(work, cycle_flow_size(start->flow)));
+    cycle_flow_scales(start->flow, work->search.scales);
+    work->branch++;
+    TRY(curve_follow(work, start, period, -1));
+    curve_reverse(points, first);
+    ResponsePoint *point = curve_add_point(work, begin.value, CHOICE_ABSENT);
+    TRY(status_made(point != NULL));
+    TRY(fields_copy(response_point_fields, &points->at[start->point], point));
+    point->branch = work->branch;
+    point->direction = CHOICE_ABSENT;
+    return curve_follow(work, start, period, 1);
+}
+
+static Status curve_continue_all(CurveWork *work) {
+    enum { VECTOR = CURVE_STATE + 1 };
+    work->block = calloc(4 * VECTOR + VECTOR * VECTOR, sizeof *work->block);
+    TRY(status_made(work->block != NULL));
+    work->z = work->block;
+    work->at = work->z + VECTOR;
+    work->tangent = work->at + VECTOR;
+    work->by_value = work->tangent + VECTOR;
+    work->matrix = work->by_value + VECTOR;
+    for (size_t i = 0; i < work->start_count; i++)
+        TRY(curve_continue(work, &work->starts[i]));
+    return work->answer->points.count + 1 < curve_continued_max(work)
+               ? STATUS_OK
+               : warnings_add(&work->answer->warnings, "/study/continuation",
+                              "the continuation ended at its limit of %zu points: give a larger "
+                              "count or a shorter range",
+                              CURVE_FACTOR * (size_t)work->study->axis.count);
+}
+
+static Status curve_begin(void *of, const StudyTools *tools, Problem *problem) {
+    CurveWork *work = of;
+    const ResponseStudy *study = work->study = work->work.study;
+    work->answer = work->work.answer;
+    work->tools = tools;
+    work->problem = problem;
+    work->range = (ProgressRange){tools->progress, 0, 0, 0};
+    work->progress = progress_range_view(&work->range);
+    if (study->direction != CURVE_DOWN)
+        TRY(curve_sweep(work, CURVE_UP));
+    if (study->direction != CURVE_UP)
+        TRY(curve_sweep(work, CURVE_DOWN));
+    if (study->continuation)
+        TRY(curve_continue_all(work));
+    for (size_t i = 0; i < work->answer->points.count; i++)
+        work->answer->points.at[i].index = i;
+    return STATUS_OK;
+}
+
+static void curve_free(void *of) {
+    CurveWork *work = of;
+    for (size_t i = 0; i < work->start_count; i++)
+        cycle_flow_free(work->starts[i].flow);
+    cycle_flow_free(work->flow);
+    orbit_search_clear(&work->search);
+    free(work->block);
+}
+
+const StudyKind study_response = {
+    .kind =
+        {"response",
+         "steady motion under a sine while a number varies: periodic orbits and their stability",
+         response_study_fields, sizeof(ResponseStudy)},
+    .answer = &(const Kind){"response", "orbits and sections at each value", response_answer_fields,
+                            sizeof(ResponseCurve)},
+    .shorten = "ask for fewer points, settle_cycles or section_points",
+    .references = curve_references,
+    .max_runs = 1000,
+    .complete = curve_complete,
+    .cost = curve_cost,
+    .work_size = sizeof(CurveWork),
+    .begin = curve_begin,
+    .free = curve_free,
+};
