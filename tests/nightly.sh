@@ -135,6 +135,8 @@ part_truth() {
     sized '2 3 100' '80 3 100' build/tests/truth_test_ensemble_c
     # Periodic orbits of drawn scenes: stable ones attract, unstable ones repel; orbits, seed. 15 s
     sized '12 7' '600 7' build/tests/truth_test_orbits_c
+    # Sobol indices of a function and of a scene with known ones: in 92 to 98 % of the trials the interval holds them. 60 s
+    sized '4 1' '500 1000' build/tests/truth_test_sobol_indices_c
     # Force traces: how often the stated interval of T_c holds it, in 92 to 98 % of a cell's trials; trials, seed. 800 s
     sized '4 1' '400 1' build/tests/truth_test_traces_c
 }

@@ -18,7 +18,7 @@ enum {
     RUNS_MAX = 10000,
     MEMBERS_MAX = 100000,  // runs for Sobol indices
     HISTORY_POINTS = 1000, // of the displacement over time
-    COST_SAMPLES = 16,
+    COST_SAMPLES = 8,
 };
 
 // clang-format off
@@ -318,7 +318,8 @@ static Status ensemble_cost_of_draws(const EnsembleStudy *study, const Simulatio
     InputModel model;
     double sum = 0;
     size_t count = 0;
-    Status status = ensemble_model(study, base, &model);
+    Status status = input_model_make(&study->inputs, base, SAMPLING_RANDOM, study->first_seed,
+                                     COST_SAMPLES, 1, &model);
     for (size_t i = 0; i < COST_SAMPLES && i < study->runs && status == STATUS_OK; i++) {
         double values[INPUT_NUMBERS_MAX];
         uint64_t again[INPUT_NUMBERS_MAX] = {0};

@@ -1,6 +1,7 @@
 // A sweep of the paper's free sponge scene, summary only, through the whole jobs room (judging,
-// chunks, database, result), beside the core alone in a loop on as many threads; then what judging
-// and storing cost by themselves. Rounds of both in turn, medians.
+// chunks, database, result), beside the core alone in a loop on as many threads, and an ensemble of
+// as many draws of the same clearances; then what judging and storing cost by themselves. Rounds of
+// all in turn, medians.
 //
 //     bench_sweep [points [threads [rounds]]]
 #include <pthread.h>
@@ -20,16 +21,24 @@ enum { ROUNDS_MAX = 64 };
 
 static size_t points = 10000, threads = 2, rounds = 5;
 
-static void scene_text(char target[1024], size_t count, double mass) {
+static void scene_text(char target[1024], size_t count, double mass, bool is_ensemble) {
+    char study[400];
+    snprintf(study, sizeof study,
+             is_ensemble ? "{\"kind\": \"ensemble\", \"runs\": %zu, \"inputs\": [{\"pointer\": "
+                           "\"/dampers/0/clearance\", \"distribution\": \"uniform\", \"from\": "
+                           "0.01, \"to\": 0.03}]}"
+                         : "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+                           "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.03, \"count\": "
+                           "%zu}]}",
+             count);
     snprintf(target, 1024,
              "{\"structure\": {\"mass\": %.17g, \"stiffness\": 865, \"damping\": 1.092},"
              " \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],"
              " \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015},"
              " \"duration\": 10, \"sample_rate\": 1000,"
              " \"output\": {\"channels\": [], \"psd\": null, \"impacts\": false},"
-             " \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
-             "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.03, \"count\": %zu}]}}",
-             mass, count);
+             " \"study\": %s}",
+             mass, study);
 }
 
 static int fail(const char *what, const Problem *problem) {
@@ -76,11 +85,11 @@ static double time_core(const Simulation *scenes) {
     return 1e-9 * (double)(clock_monotonic_ns() - began_ns);
 }
 
-// A new sweep each time: the structure's mass is another.
-static double time_room(JobManager *manager, size_t round, Problem *problem) {
+// A new study each time: the structure's mass is another.
+static double time_room(JobManager *manager, size_t round, bool is_ensemble, Problem *problem) {
     char text[1024];
     Job *job;
-    scene_text(text, points, 1.35 + 1e-9 * (double)round);
+    scene_text(text, points, 1.35 + 1e-9 * (double)round, is_ensemble);
     const Submission submission = {.text = text, .size = strlen(text)};
     const int64_t began_ns = clock_monotonic_ns();
     if (jobs_submit(manager, &submission, &job, problem) != STATUS_OK)
@@ -108,7 +117,7 @@ static int bench_judging(Db *db, Problem *problem) {
     Warnings warnings = {NULL, 0};
     SweepGrid *plan;
     const SimulationLimits limits = {.samples = 1 << 25, .points = 1 << 20};
-    scene_text(text, 100000, 1.35);
+    scene_text(text, 100000, 1.35, false);
     int64_t began_ns = clock_monotonic_ns();
     if (jobs_prepare(db, text, strlen(text), &limits, &inquiry, &warnings, problem) != STATUS_OK)
         return fail("judging", problem);
@@ -175,7 +184,7 @@ int main(int argc, char **argv) {
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     SweepGrid *plan;
-    scene_text(text, points, 1.35);
+    scene_text(text, points, 1.35, false);
     if (jobs_prepare(db, text, strlen(text), NULL, &inquiry, &warnings, &problem) != STATUS_OK ||
         sweep_grid_new((const SweepStudy *)(const void *)inquiry.study, &inquiry.simulation, NULL,
                        &plan, &problem) != STATUS_OK)
@@ -187,15 +196,20 @@ int main(int argc, char **argv) {
         return 1;
 
     double core[ROUNDS_MAX], room[ROUNDS_MAX], ratio[ROUNDS_MAX];
-    double core_cpu[ROUNDS_MAX], room_cpu[ROUNDS_MAX];
+    double core_cpu[ROUNDS_MAX], room_cpu[ROUNDS_MAX], draws[ROUNDS_MAX], draws_ratio[ROUNDS_MAX],
+        draws_cpu[ROUNDS_MAX];
     for (size_t i = 0; i < rounds; i++) {
         double began = process_cpu();
         core[i] = time_core(scenes);
         core_cpu[i] = process_cpu() - began;
         began = process_cpu();
-        room[i] = time_room(manager, i + 1, &problem);
+        room[i] = time_room(manager, i + 1, false, &problem);
         room_cpu[i] = process_cpu() - began;
-        if (room[i] < 0)
+        began = process_cpu();
+        draws[i] = points <= 10000 ? time_room(manager, i + 1, true, &problem) : 0;
+        draws_cpu[i] = process_cpu() - began;
+        draws_ratio[i] = room[i] / draws[i];
+        if (room[i] < 0 || draws[i] < 0)
             return fail("submitting", &problem);
         ratio[i] = core[i] / room[i];
     }
@@ -204,8 +218,12 @@ int main(int argc, char **argv) {
     printf("core alone in a loop: %.0f points/s\n", (double)points / median(core, rounds));
     printf("sweep, whole and durable: %.0f points/s\n", (double)points / median(room, rounds));
     printf("sweep / core: %.2f\n", median(ratio, rounds));
-    printf("CPU a point: core %.1f us, sweep %.1f us\n", micro * median(core_cpu, rounds),
-           micro * median(room_cpu, rounds));
+    if (points <= 10000)
+        printf("ensemble of uncertain inputs: %.0f runs/s\nensemble / sweep: %.2f\n",
+               (double)points / median(draws, rounds), median(draws_ratio, rounds));
+    printf("CPU a point: core %.1f us, sweep %.1f us, ensemble %.1f us\n",
+           micro * median(core_cpu, rounds), micro * median(room_cpu, rounds),
+           micro * median(draws_cpu, rounds));
     int code = bench_judging(db, &problem);
     if (code == 0)
         code = bench_rows(db, &problem);
