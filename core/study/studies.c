@@ -6,6 +6,13 @@ const StudyKind *const studies[] = {
     &study_sweep,    &study_response, NULL,
 };
 
+const StudyKind *study_of_answer(const Kind *answer) {
+    size_t i = 0;
+    while (studies[i]->answer != answer)
+        i++;
+    return studies[i];
+}
+
 static const Kind *studies_kind(size_t index) {
     return index + 1 < COUNT(studies) ? &studies[index]->kind : NULL;
 }

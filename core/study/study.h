@@ -170,12 +170,17 @@ struct StudyKind {
 };
 
 extern const StudyKind *const studies[]; // NULL-terminated
+const StudyKind *study_of_answer(const Kind *answer);
 extern const KindTable study_kinds, study_answer_kinds;
 extern const StudyKind study_tradeoff, study_ensemble, study_compare, study_sensitivity,
     study_sweep, study_calibrate, study_response;
 
 static inline const StudyKind *study_kind(const Variant *study) {
     return (const StudyKind *)(const void *)study->kind;
+}
+
+static inline const char *study_document_name(const StudyKind *kind) {
+    return kind->document != NULL ? kind->document : kind->kind.name;
 }
 
 // Whether a study has members, which threads can share.

@@ -102,11 +102,10 @@ static void result_put_links(Bytes *bytes, const ResultRow *row, const Simulatio
     result_put_formats(bytes, id, "energy", tables);
     bytes_json(bytes, ", \"bundle.zip\": \"%s/v1/results/%s/bundle.zip\"", base, id);
     if (answer->study != NULL) {
-        // A sweep's rows are a table of their own.
         const Kind *kind = answer->study->kind;
         char others[64];
         study_formats_names(study_formats(kind) + 1, "", others, sizeof others);
-        result_put_formats(bytes, id, kind == study_sweep.answer ? "table" : kind->name, others);
+        result_put_formats(bytes, id, study_document_name(study_of_answer(kind)), others);
     }
     bytes_text(bytes, "}");
 }

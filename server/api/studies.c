@@ -37,11 +37,13 @@ static Status study_format(const Request *request, const StudyFormat *offered, R
     return STATUS_OK;
 }
 
-// The path ends with the kind's name.
+// The path ends with the name of the kind's document.
 static const StudyKind *study_of_route(const Request *request) {
     const char *name = strrchr(request->route->pattern, '/') + 1;
+    const size_t length = strcspn(name, ".");
     size_t i = 0;
-    while (strncmp(studies[i]->kind.name, name, strcspn(name, ".")) != 0)
+    while (strncmp(study_document_name(studies[i]), name, length) != 0 ||
+           study_document_name(studies[i])[length] != '\0')
         i++;
     return studies[i];
 }
@@ -60,7 +62,7 @@ Status results_study(App *app, const Request *request, Reply *reply, Problem *pr
     if (status == STATUS_OK) {
         snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, kind->kind.name, format->extension);
         if (!reply_immutable(reply, request, tag)) {
-            study_format_write(format, answer.study, &bytes);
+            study_format_write(format, &(StudyDocument){answer.study, row.id, row.scene}, &bytes);
             status = reply_bytes(reply, 200, format->content_type, &bytes, problem);
         }
     }

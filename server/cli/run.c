@@ -357,10 +357,10 @@ static Status study_check_outputs(const StudyKind *kind, const Texts *outputs, P
 }
 
 // `path` NULL: to standard output.
-static Status study_write(const StudyFormat *format, const char *path, const Variant *answer,
-                          Problem *problem) {
+static Status study_write(const StudyFormat *format, const char *path,
+                          const StudyDocument *document, Problem *problem) {
     Bytes bytes = {0};
-    study_format_write(format, answer, &bytes);
+    study_format_write(format, document, &bytes);
     const Status status = bytes.is_failed
                               ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
                               : output_put(path, &bytes, problem);
@@ -374,9 +374,9 @@ static Status study_print(const Command *command, const Variant *answer, Problem
     PrintTableView view = *command->view;
     Bytes json = {0};
     view.fields = fields;
-    study_format_write(study_formats(answer->kind), answer, &json);
-    if (command->study->add != NULL && json.count > 2) {
-        json.count -= 2; // "}\n"
+    document_answer(&json, answer);
+    if (command->study->add != NULL && json.count > 1) {
+        json.count -= 1; // "}"
         command->study->add(answer, &json);
         bytes_text(&json, "}");
     }
@@ -397,14 +397,23 @@ static Status study_make(const StudyRequest *request, const StudySettings *setti
     Status status =
         jobs_run_study(request->study, &request->simulation, limits, &watch, &answer, problem);
     progress_bar_stop(&bar);
+    char result[72];
+    Bytes scene = {0};
+    jobs_result_id(request, result);
+    document_scene(&scene, request);
+    if (status == STATUS_OK && scene.is_failed)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
+    const StudyDocument document = {answer, result, scene.at};
     // The first format of every study is JSON. The document's own study prints nothing where it is
     // written to files.
     if (status == STATUS_OK && (settings->json || (command->view == NULL && outputs->count == 0)))
-        status = study_write(study_formats(kind->answer), NULL, answer, problem);
+        status = study_write(study_formats(kind->answer), NULL, &document, problem);
     else if (status == STATUS_OK && command->view != NULL)
         status = study_print(command, answer, problem);
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
-        status = study_write(study_format(kind, outputs->at[i]), outputs->at[i], answer, problem);
+        status =
+            study_write(study_format(kind, outputs->at[i]), outputs->at[i], &document, problem);
+    bytes_clear(&scene);
     variant_free(answer);
     return status;
 }

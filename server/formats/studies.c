@@ -10,11 +10,6 @@
 #include "server/jobs/documents.h"
 #include "server/util/csv.h"
 
-static void json_write(const Variant *answer, Bytes *bytes) {
-    document_answer(bytes, answer);
-    bytes_text(bytes, "\n");
-}
-
 // A row for each seed, with the drawn inputs.
 static void ensemble_csv(const Variant *answer, Bytes *bytes) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
@@ -130,15 +125,19 @@ static const char csv_type[] = "text/csv; charset=utf-8";
 
 static const struct {
     const StudyKind *study;
-    StudyFormat formats[STUDY_FORMATS_MAX]; // ended by one without extension
+    void (*table)(const Variant *answer, StudyTable *table); // of csv and the like; NULL: own ones
+    StudyFormat formats[STUDY_FORMATS_MAX];                  // ended by one without extension
 } all[] = {
     {&study_tradeoff,
-     {{"json", "application/json", false, json_write}, {"svg", chart_type, false, chart_tradeoff}}},
+     NULL,
+     {{"json", "application/json", false, NULL}, {"svg", chart_type, false, chart_tradeoff}}},
     {&study_ensemble,
-     {{"json", "application/json", false, json_write},
+     NULL,
+     {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, ensemble_csv},
       {"svg", chart_type, false, chart_ensemble}}},
     {&study_sweep,
+     NULL,
      {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, NULL},
       {"npy", "application/x-npy", true, NULL},
@@ -146,23 +145,27 @@ static const struct {
       {"mat", "application/x-matlab-data", true, NULL},
       {"svg", chart_type, false, sweep_chart}}},
     {&study_compare,
-     {{"json", "application/json", false, json_write},
+     NULL,
+     {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, compare_csv},
       {"svg", chart_type, false, chart_compare}}},
     {&study_sensitivity,
-     {{"json", "application/json", false, json_write},
+     NULL,
+     {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, sensitivity_csv},
       {"svg", chart_type, false, chart_sensitivity}}},
 };
 
-static const StudyFormat none[] = {{"json", "application/json", false, json_write},
-                                   {NULL, NULL, false, NULL}};
+// The row of a kind of answers; all have one.
+static size_t study_format_row(const Kind *kind) {
+    size_t i = 0;
+    while (i + 1 < COUNT(all) && all[i].study->answer != kind)
+        i++;
+    return i;
+}
 
 const StudyFormat *study_formats(const Kind *kind) {
-    for (size_t i = 0; i < COUNT(all); i++)
-        if (all[i].study->answer == kind)
-            return all[i].formats;
-    return none;
+    return all[study_format_row(kind)].formats;
 }
 
 const StudyFormat *study_format_find(const StudyFormat *formats, const char *extension) {
@@ -171,15 +174,31 @@ const StudyFormat *study_format_find(const StudyFormat *formats, const char *ext
     return formats->extension != NULL ? formats : NULL;
 }
 
-void study_format_write(const StudyFormat *format, const Variant *answer, Bytes *bytes) {
+static void study_format_table(const StudyFormat *format, const Table *table, Bytes *bytes) {
+    if (format_write(format_find(format->extension), table, bytes, NULL) != STATUS_OK)
+        bytes->is_failed = true;
+}
+
+void study_format_write(const StudyFormat *format, const StudyDocument *document, Bytes *bytes) {
+    const Variant *answer = document->answer;
+    const size_t row = study_format_row(answer->kind);
     if (format->write != NULL) {
         format->write(answer, bytes);
-        return;
+    } else if (answer->kind == study_sweep.answer) {
+        SweepDocument sweep = sweep_document((const Sweep *)(const void *)answer);
+        const Table table = sweep_document_table(&sweep);
+        study_format_table(format, &table, bytes);
+    } else if (all[row].table != NULL && strcmp(format->extension, "json") != 0) {
+        StudyTable columns = {.rows = 0};
+        all[row].table(answer, &columns);
+        const TableSource source = study_table_source(&columns);
+        const Table table = study_table_view(&columns, &source);
+        study_format_table(format, &table, bytes);
+        bytes->is_failed = bytes->is_failed || columns.is_failed;
+        study_table_clear(&columns);
+    } else {
+        document_study(bytes, document);
     }
-    SweepDocument document = sweep_document((const Sweep *)(const void *)answer);
-    const Table table = sweep_document_table(&document);
-    if (format_write(format_find(format->extension), &table, bytes, NULL) != STATUS_OK)
-        bytes->is_failed = true;
 }
 
 void study_formats_names(const StudyFormat *formats, const char *before, char *target,

@@ -6,6 +6,7 @@
 #include "core/study/study.h"
 #include "core/study/sweep.h"
 #include "server/formats/format.h"
+#include "server/jobs/documents.h"
 
 enum { STUDY_FORMATS_MAX = 7 }; // at most, with the end
 
@@ -13,7 +14,7 @@ typedef struct StudyFormat {
     const char *extension; // "svg"; NULL: the end
     const char *content_type;
     bool is_binary; // Range requests make sense
-    // Appends the whole document; NULL: that of the format of the answer's table.
+    // Appends the whole document; NULL: JSON, or that of the format of the answer's table.
     void (*write)(const Variant *answer, Bytes *bytes);
 } StudyFormat;
 
@@ -21,10 +22,30 @@ typedef struct StudyFormat {
 const StudyFormat *study_formats(const Kind *kind);
 const StudyFormat *study_format_find(const StudyFormat *formats, const char *extension);
 // Appends the whole document.
-void study_format_write(const StudyFormat *format, const Variant *answer, Bytes *bytes);
+void study_format_write(const StudyFormat *format, const StudyDocument *document, Bytes *bytes);
 
 // "json, svg", each behind `before`.
 void study_formats_names(const StudyFormat *formats, const char *before, char *target, size_t size);
+
+// --- tables of answers ---
+
+// Columns of numbers and of words, filled cell by cell. All zero is empty; once it failed (memory)
+// it stays so.
+typedef struct StudyTable {
+    size_t rows; // set before the first column
+    struct StudyColumn *at;
+    size_t count;
+    bool is_failed;
+} StudyTable;
+
+// Adds a column of unknown numbers (NAN) and returns its index. The name is copied.
+size_t study_table_add(StudyTable *table, const char *name, const char *unit);
+void study_table_set(StudyTable *table, size_t column, size_t row, double value);
+// Of a column that has words alone, without quotes or commas; the word is borrowed.
+void study_table_set_word(StudyTable *table, size_t column, size_t row, const char *word);
+TableSource study_table_source(StudyTable *table);                          // borrows it
+Table study_table_view(const StudyTable *table, const TableSource *source); // borrows both
+void study_table_clear(StudyTable *table);
 
 // --- tables of sweeps ---
 

@@ -56,10 +56,20 @@ void document_scene(Bytes *bytes, const StudyRequest *inquiry) {
     encode_item(bytes, study_request_fields, &plain, WRITE_SCENE);
 }
 
-void document_answer(Bytes *bytes, const Variant *answer) {
-    bytes_text(bytes, "{\"kind\": ");
-    bytes_json_string(bytes, answer->kind->name);
-    bytes_text(bytes, ", ");
+static void document_put_answer(Bytes *bytes, const Variant *answer, const char *result,
+                                const char *scene) {
+    bytes_json(bytes, "{\"kind\": %s, ", answer->kind->name);
+    if (result != NULL)
+        bytes_json(bytes, "\"result\": %s, \"scene\": %p, ", result, scene);
     (void)encode_members(bytes, answer->kind->fields, answer, WRITE_REPORT);
     bytes_text(bytes, "}");
+}
+
+void document_answer(Bytes *bytes, const Variant *answer) {
+    document_put_answer(bytes, answer, NULL, NULL);
+}
+
+void document_study(Bytes *bytes, const StudyDocument *document) {
+    document_put_answer(bytes, document->answer, document->result, document->scene);
+    bytes_text(bytes, "\n");
 }

@@ -18,4 +18,12 @@ void document_scene(Bytes *bytes, const StudyRequest *inquiry);
 // A study's answer as it is sent: {"kind": ...}, what is unknown is null.
 void document_answer(Bytes *bytes, const Variant *answer);
 
+// An answer with the result that it belongs to, as /v1/results/{id}/DOCUMENT.json has it.
+typedef struct StudyDocument {
+    const Variant *answer;
+    const char *result; // its id
+    const char *scene;  // the completed scene as JSON
+} StudyDocument;
+void document_study(Bytes *bytes, const StudyDocument *document);
+
 #endif

@@ -41,18 +41,26 @@ const Field measurement_body_fields[] = {
 };
 
 const SchemaDocument schema_documents[] = {
-    {"scene", "A scene: the simulation that a job requests", study_request_fields},
-    {"material", "A buffer material: the contents of one revision", material_fields},
-    {"new_material", "A new material: its first revision", new_material_fields},
-    {"material_revision", "A new revision of a material: its whole contents, and why", material_revision_fields},
-    {"material_revert", "A revision to repeat", material_revert_fields},
-    {"material_review", "A review of a revision", material_review_fields},
-    {"measurement", "A drop test: its raw data", measurement_body_fields},
-    {NULL, NULL, NULL},
+    {"scene", "A scene: the simulation that a job requests", study_request_fields, NULL},
+    {"material", "A buffer material: the contents of one revision", material_fields, NULL},
+    {"new_material", "A new material: its first revision", new_material_fields, NULL},
+    {"material_revision", "A new revision of a material: its whole contents, and why", material_revision_fields, NULL},
+    {"material_revert", "A revision to repeat", material_revert_fields, NULL},
+    {"material_review", "A review of a revision", material_review_fields, NULL},
+    {"measurement", "A drop test: its raw data", measurement_body_fields, NULL},
+    {"tradeoff", "Answer of the study tradeoff", NULL, &study_tradeoff},
+    {"ensemble", "Answer of the study ensemble", NULL, &study_ensemble},
+    {"compare", "Answer of the study compare", NULL, &study_compare},
+    {"sensitivity", "Answer of the study sensitivity", NULL, &study_sensitivity},
+    {NULL, NULL, NULL, NULL},
 };
 // clang-format on
 
-static void schema_object(Bytes *bytes, const Field *fields, const KindTable *kinds,
+// A document that is read: members that are required, ranges, defaults. One that is written: all
+// members are there, and null where they are unknown.
+typedef enum SchemaUse { SCHEMA_READ, SCHEMA_WRITTEN } SchemaUse;
+
+static void schema_object(Bytes *bytes, SchemaUse use, const Field *fields, const KindTable *kinds,
                           const Kind *kind);
 
 static void schema_text(Bytes *bytes, const char *name, const char *text) {
@@ -71,11 +79,13 @@ static void schema_texts(Bytes *bytes, const char *name, const char *const *text
 }
 
 // A count is never negative, also where its row allows it.
-static void schema_number(Bytes *bytes, const Field *field) {
+static void schema_number(Bytes *bytes, SchemaUse use, const Field *field) {
     const bool is_count = field->kind == FIELD_KIND_COUNT;
     const Range *range = &field->range;
     const double min = is_count ? fmax(range->min, 0) : range->min;
     bytes_format(bytes, ",\"type\":\"%s\"", is_count ? "integer" : "number");
+    if (use == SCHEMA_WRITTEN) // what was computed has no limits
+        return;
     if (!isinf(min))
         schema_real(
             bytes, range->is_open_below && min == range->min ? "exclusiveMinimum" : "minimum", min);
@@ -104,9 +114,12 @@ static void schema_choices(Bytes *bytes, const Field *field) {
     bytes_text(bytes, ")(_[1-9][0-9]*)?$\"");
 }
 
-static void schema_reals(Bytes *bytes, const Field *field) {
+static void schema_reals(Bytes *bytes, SchemaUse use, const Field *field) {
     bytes_text(bytes, ",\"type\":\"array\",\"items\":{");
-    schema_number(bytes, field);
+    if (use == SCHEMA_WRITTEN)
+        bytes_text(bytes, ",\"type\":[\"number\",\"null\"]");
+    else
+        schema_number(bytes, use, field);
     bytes_text(bytes, "}");
     schema_length(bytes, field);
 }
@@ -133,12 +146,13 @@ static void schema_strings(Bytes *bytes, const Field *field) {
 
 // An object; with a shorthand also the string of the row it stands for, and null where it is
 // allowed.
-static void schema_item(Bytes *bytes, const Field *field) {
-    const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0;
-    const bool has_forms = field->shorthand != NULL || takes_null;
+static void schema_item(Bytes *bytes, SchemaUse use, const Field *field) {
+    const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0 && use == SCHEMA_READ;
+    const bool is_named = field->shorthand != NULL && use == SCHEMA_READ;
+    const bool has_forms = is_named || takes_null;
     bytes_text(bytes, has_forms ? ",\"anyOf\":[{" : "");
-    schema_object(bytes, field->fields, NULL, NULL);
-    if (field->shorthand != NULL) {
+    schema_object(bytes, use, field->fields, NULL, NULL);
+    if (is_named) {
         const Field *row = fields_find(field->fields, field->shorthand, NULL);
         bytes_text(bytes, "},{\"type\":\"string\"");
         if (row->kind == FIELD_KIND_CHOICE)
@@ -152,12 +166,12 @@ static void schema_item(Bytes *bytes, const Field *field) {
 }
 
 // One schema per kind. Only the default kind may be without its tag, so exactly one of them fits.
-static void schema_variant(Bytes *bytes, const Field *field) {
+static void schema_variant(Bytes *bytes, SchemaUse use, const Field *field) {
     const Kind *kind;
     bytes_text(bytes, ",\"oneOf\":[");
     for (size_t i = 0; (kind = field->kinds->at(i)) != NULL; i++) {
         bytes_json(bytes, ",{\"title\":%s,\"description\":%s", kind->name, kind->doc);
-        schema_object(bytes, kind->fields, field->kinds, kind);
+        schema_object(bytes, use, kind->fields, field->kinds, kind);
         bytes_text(bytes, "}");
     }
     bytes_text(bytes, "]");
@@ -165,12 +179,12 @@ static void schema_variant(Bytes *bytes, const Field *field) {
         bytes_json(bytes, ",\"default\":{\"%s\":%s}", field->kinds->tag, field->kinds->at(0)->name);
 }
 
-static void schema_value(Bytes *bytes, const Field *field) {
-    const bool has_default = field->presence == PRESENCE_DEFAULT;
+static void schema_value(Bytes *bytes, SchemaUse use, const Field *field) {
+    const bool has_default = field->presence == PRESENCE_DEFAULT && use == SCHEMA_READ;
     switch (field->kind) {
     case FIELD_KIND_REAL:
     case FIELD_KIND_COUNT:
-        schema_number(bytes, field);
+        schema_number(bytes, use, field);
         if (has_default)
             schema_real(bytes, "default", field->initial);
         break;
@@ -192,15 +206,15 @@ static void schema_value(Bytes *bytes, const Field *field) {
     case FIELD_KIND_REALS:
         if ((field->flags & FIELD_LONE) != 0) {
             bytes_text(bytes, ",\"anyOf\":[{");
-            schema_number(bytes, field);
+            schema_number(bytes, use, field);
             bytes_text(bytes, "},{");
         }
-        schema_reals(bytes, field);
+        schema_reals(bytes, use, field);
         bytes_text(bytes, (field->flags & FIELD_LONE) != 0 ? "}]" : "");
         break;
     case FIELD_KIND_ROWS:
         bytes_text(bytes, ",\"type\":\"array\",\"items\":{");
-        schema_reals(bytes, field);
+        schema_reals(bytes, use, field);
         bytes_text(bytes, "}");
         schema_length(bytes, field);
         break;
@@ -208,18 +222,18 @@ static void schema_value(Bytes *bytes, const Field *field) {
         schema_strings(bytes, field);
         break;
     case FIELD_KIND_ITEM:
-        schema_item(bytes, field);
+        schema_item(bytes, use, field);
         bytes_text(bytes, has_default ? ",\"default\":{}" : "");
         break;
     case FIELD_KIND_LIST:
         bytes_text(bytes, ",\"type\":\"array\",\"items\":{");
-        schema_item(bytes, field);
+        schema_item(bytes, use, field);
         bytes_text(bytes, "}");
         schema_length(bytes, field);
         bytes_text(bytes, has_default ? ",\"default\":[]" : "");
         break;
     case FIELD_KIND_VARIANT:
-        schema_variant(bytes, field);
+        schema_variant(bytes, use, field);
         break;
     case FIELD_KIND_BASE:
     case FIELD_KIND_REFCOUNT:
@@ -228,10 +242,17 @@ static void schema_value(Bytes *bytes, const Field *field) {
     }
 }
 
-static void schema_properties(Bytes *bytes, const Field *fields) {
+// Whether a written member can be unknown; lists are empty then.
+static bool schema_is_nullable(const Field *field) {
+    const bool is_list = field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
+                         field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
+    return field->presence == PRESENCE_OPTIONAL && !is_list && field->kind != FIELD_KIND_FLAG;
+}
+
+static void schema_properties(Bytes *bytes, SchemaUse use, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (field->kind == FIELD_KIND_BASE) {
-            schema_properties(bytes, field->fields);
+            schema_properties(bytes, use, field->fields);
             continue;
         }
         if ((field->flags & FIELD_HIDDEN) != 0)
@@ -239,34 +260,38 @@ static void schema_properties(Bytes *bytes, const Field *fields) {
         bytes_format(bytes, ",\"%s\":{", field->name);
         if (field->doc != NULL)
             schema_text(bytes, "description", field->doc);
-        schema_value(bytes, field);
+        const bool may_be_null = use == SCHEMA_WRITTEN && schema_is_nullable(field);
+        bytes_text(bytes, may_be_null ? ",\"anyOf\":[{" : "");
+        schema_value(bytes, use, field);
+        bytes_text(bytes, may_be_null ? "},{\"type\":\"null\"}]" : "");
         if (field->unit != NULL)
             schema_text(bytes, "x-unit", field->unit);
         bytes_text(bytes, "}");
     }
 }
 
-static void schema_required(Bytes *bytes, const Field *fields) {
+static void schema_required(Bytes *bytes, SchemaUse use, const Field *fields) {
     for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
         if (field->kind == FIELD_KIND_BASE)
-            schema_required(bytes, field->fields);
-        else if (field->presence == PRESENCE_REQUIRED)
+            schema_required(bytes, use, field->fields);
+        else if (use == SCHEMA_WRITTEN ? (field->flags & FIELD_HIDDEN) == 0
+                                       : field->presence == PRESENCE_REQUIRED)
             bytes_format(bytes, ",\"%s\"", field->name);
     }
 }
 
 // The members of an object's schema; `kind` is NULL for a plain object, else one of `kinds`, which
 // their tag names.
-static void schema_object(Bytes *bytes, const Field *fields, const KindTable *kinds,
+static void schema_object(Bytes *bytes, SchemaUse use, const Field *fields, const KindTable *kinds,
                           const Kind *kind) {
     bytes_text(bytes, ",\"type\":\"object\",\"properties\":{");
     if (kind != NULL)
         bytes_json(bytes, ",\"%s\":{\"const\":%s}", kinds->tag, kind->name);
-    schema_properties(bytes, fields);
+    schema_properties(bytes, use, fields);
     bytes_text(bytes, "},\"required\":[");
     if (kind != NULL && (kinds->is_named || kind != kinds->at(0)))
         bytes_format(bytes, ",\"%s\"", kinds->tag);
-    schema_required(bytes, fields);
+    schema_required(bytes, use, fields);
     bytes_text(bytes, "],\"additionalProperties\":false");
 }
 
@@ -309,13 +334,30 @@ static void schema_indent(Bytes *bytes, const char *text) {
     bytes_text(bytes, "\n");
 }
 
+// An answer as its document: with the result and the scene it belongs to.
+static void schema_answer(Bytes *bytes, const Kind *answer) {
+    bytes_json(bytes,
+               ",\"type\":\"object\",\"properties\":{,\"kind\":{\"const\":%s},"
+               "\"result\":{\"type\":\"string\",\"description\":\"id of the result\"},"
+               "\"scene\":{\"type\":\"object\",\"description\":\"the completed scene, with the "
+               "request\"}",
+               answer->name);
+    schema_properties(bytes, SCHEMA_WRITTEN, answer->fields);
+    bytes_text(bytes, "},\"required\":[,\"kind\",\"result\",\"scene\"");
+    schema_required(bytes, SCHEMA_WRITTEN, answer->fields);
+    bytes_text(bytes, "],\"additionalProperties\":false");
+}
+
 void schema_write_document(Bytes *bytes, const SchemaDocument *document) {
     Bytes text = {0};
     bytes_json(&text,
                "{,\"$schema\":\"https://json-schema.org/draft/2020-12/schema\","
                "\"$id\":\"/schemas/%s\",\"title\":%s",
                document->name, document->title);
-    schema_object(&text, document->fields, NULL, NULL);
+    if (document->study != NULL)
+        schema_answer(&text, document->study->answer);
+    else
+        schema_object(&text, SCHEMA_READ, document->fields, NULL, NULL);
     bytes_text(&text, "}");
     if (text.is_failed)
         bytes->is_failed = true;

@@ -37,7 +37,8 @@ extern const Field measurement_body_fields[];
 // The documents that have a schema: "scene", "material" ...
 typedef struct SchemaDocument {
     const char *name, *title;
-    const Field *fields;
+    const Field *fields;           // of a document that is read; else NULL, and
+    const struct StudyKind *study; // whose answer is written
 } SchemaDocument;
 extern const SchemaDocument schema_documents[]; // ends with name == NULL
 

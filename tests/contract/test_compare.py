@@ -55,7 +55,8 @@ def test_the_study_sets_contact_models_side_by_side():
         base = "/v1/results/" + job["result"]
         result = daemon.get(base).json()
         answer = daemon.get(result["links"]["compare"]).json()
-        assert answer == result["study"] and result["scene"]["study"]["separations"] == ["zero_penetration", "zero_force"]
+        assert answer == {**result["study"], "result": result["id"], "scene": result["scene"]}
+        assert result["scene"]["study"]["separations"] == ["zero_penetration", "zero_force"]
         entries = {entry["name"]: entry for entry in answer["entries"]}
         assert len(entries) == 9 and list(entries)[0] == "spring_damper, zero_penetration"
         assert entries["hertz"]["status"] == "refused" and "must be 1" in entries["hertz"]["why"]

@@ -197,7 +197,8 @@ def test_a_job_makes_the_study():
         result = daemon.get(base).json()
         whole = daemon.get(base + "/ensemble.json")
         answer = whole.json()
-        assert answer == result["study"] and result["links"]["ensemble"] == base + "/ensemble.json"
+        assert answer == {**result["study"], "result": result["id"], "scene": result["scene"]}
+        assert result["links"]["ensemble"] == base + "/ensemble.json"
         summary = {name: value for name, value in result["summary"].items() if not name.endswith("_reduction")}
         assert {name: answer["table"][0][name] for name in summary} == summary
         check_statistics(answer)

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """schema/openapi.json tells what routes.c has, no more and no less, and real answers have the shapes it promises."""
 
+import functools
 import json
 import os
 import re
@@ -46,11 +47,21 @@ def is_type(value, name):
     return isinstance(value, TYPES[name])
 
 
+@functools.lru_cache
+def printed(name):
+    with open(os.path.join(program.SOURCE, "schema", f"{name}.schema.json"), encoding="utf-8") as file:
+        return json.load(file)
+
+
 def faults(schema, value, place=""):
     """Where `value` is not as `schema` says; knows the keywords this document uses."""
     if schema.get("$ref", "").startswith("#/components/schemas/"):
         return faults(DOCUMENT["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]], value, place)
+    if schema.get("$ref", "").startswith("/schemas/") and place == "":
+        return faults(printed(schema["$ref"].rsplit("/", 1)[1]), value, place)
     found = []
+    if "anyOf" in schema and all(faults(choice, value) for choice in schema["anyOf"]):
+        found.append(f"{place}: is none of the choices: {min((faults(choice, value, place) for choice in schema['anyOf']), key=len)}")
     if "oneOf" in schema:
         if sum(not faults(choice, value) for choice in schema["oneOf"]) != 1:
             tried = min((faults(choice, value, place) for choice in schema["oneOf"]), key=len)

@@ -136,7 +136,7 @@ def test_a_job_makes_the_study_in_all_its_formats():
             job = program.finished(daemon, scene)
             base = "/v1/results/" + job["result"]
             result = daemon.get(base).json()
-            assert result["study"] == daemon.get(base + "/sensitivity.json").json()
+            assert daemon.get(base + "/sensitivity.json").json() == {**result["study"], "result": result["id"], "scene": result["scene"]}
             assert result["links"]["sensitivity.csv"] == base + "/sensitivity.csv"
             seen.append([daemon.get(f"{base}/sensitivity.{ending}").body for ending in ("json", "csv", "svg")])
             assert daemon.get(base + "/sensitivity", headers={"Accept": "image/svg+xml"}).body == seen[-1][2]
