@@ -154,9 +154,10 @@ static const struct {
      {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, sensitivity_csv},
       {"svg", chart_type, false, chart_sensitivity}}},
+    {NULL, NULL, {{"json", "application/json", false, NULL}}}, // of any other
 };
 
-// The row of a kind of answers; all have one.
+// The row of a kind of answers; the last one if it has none.
 static size_t study_format_row(const Kind *kind) {
     size_t i = 0;
     while (i + 1 < COUNT(all) && all[i].study->answer != kind)
