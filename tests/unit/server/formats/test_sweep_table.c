@@ -17,7 +17,8 @@ static Sweep sweep_make(void) {
     static double points[] = {0, 2, 3}, statuses[] = {SWEEP_MADE, SWEEP_UNSTABLE, SWEEP_MADE};
     static double values[] = {0.1, 7, (double)NAN, (double)NAN, 0.3, 9};
     static StudyFailure failures[] = {{SWEEP_UNSTABLE, NULL, 1, 2, grew}};
-    return (Sweep){.points = 4,
+    return (Sweep){.variant = {study_sweep.answer},
+                   .points = 4,
                    .axes = {axes, 2},
                    .metrics = {metrics, 2},
                    .table = {.failed = 1,
