@@ -128,7 +128,7 @@ enum {
     FIELD_LONE = 8,
     // TEXTS: an allowed text may end with a number from 1: "displacement_2".
     FIELD_NUMBERED = 16,
-    // TEXTS: each is a JSON number, string, true or false, stored as JSON text.
+    // TEXT, TEXTS: it, or each, is a JSON number, string, true or false, stored as JSON text.
     FIELD_SCALARS = 32,
     // Internal: copied and cleared with the struct, but not read, written, described, validated or
     // found by name, and not part of the canonical form. Its presence is OPTIONAL.

@@ -131,6 +131,57 @@ static double statistics_quantile(const double *sorted, size_t count, double sha
     return from + (place - (double)below) * (to - from);
 }
 
+double run_aggregate(const RunAggregate *aggregate, double *values, size_t count) {
+    const bool is_mean = !aggregate->is_max && isnan(aggregate->quantile);
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += values[i] / (double)count;
+    if (is_mean || isnan(sum))
+        return sum;
+    reals_sort(values, count);
+    return statistics_quantile(values, count, aggregate->is_max ? 1 : aggregate->quantile);
+}
+
+// The number of runs below a quantile is binomially distributed: the interval is between two sorted
+// values that are beyond it with a probability of 2.5 % each (Conover 1999, Practical Nonparametric
+// Statistics, 3.2).
+static void run_aggregate_order(double quantile, const double *sorted, size_t count,
+                                double interval[2]) {
+    const double tail = (1 - STATISTICS_CONFIDENCE) / 2, n = (double)count;
+    double sum = 0;
+    for (size_t i = 0; i <= count; i++) {
+        const double k = (double)i;
+        sum += exp(lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1) + k * log(quantile) +
+                   (n - k) * log1p(-quantile)); // at most i runs below the quantile
+        if (sum <= tail && i < count)
+            interval[0] = sorted[i];
+        if (sum >= 1 - tail && i < count && isnan(interval[1]))
+            interval[1] = sorted[i];
+    }
+    if (isnan(interval[0]))
+        interval[1] = (double)NAN;
+    if (isnan(interval[1]))
+        interval[0] = (double)NAN;
+}
+
+void run_aggregate_interval(const RunAggregate *aggregate, double *values, size_t count,
+                            double interval[2]) {
+    Values all = {.at = values, .count = count, .mean = (double)NAN, .deviation = (double)NAN};
+    interval[0] = interval[1] = (double)NAN;
+    if (aggregate->is_max || count < 2)
+        return;
+    if (!isnan(aggregate->quantile)) {
+        reals_sort(values, count);
+        run_aggregate_order(aggregate->quantile, values, count, interval);
+        return;
+    }
+    statistics_measure(&all);
+    const double half =
+        student_t_quantile(STATISTICS_CONFIDENCE, count - 1) * all.deviation / sqrt((double)count);
+    interval[0] = all.mean - half;
+    interval[1] = all.mean + half;
+}
+
 // Number of the first run with this value.
 static uint64_t statistics_find_run(const RunTable *table, int metric, double value) {
     for (size_t i = 0; i < table->count; i++)

@@ -54,6 +54,20 @@ typedef struct RunStatistic {
     uint64_t minimum_seed, maximum_seed; // numbers of the runs; the first of equal ones
 } RunStatistic;
 
+// The statistic of a study over the runs of a scene.
+typedef struct RunAggregate {
+    bool is_max;
+    double quantile; // NAN: the mean, unless is_max
+} RunAggregate;
+
+// Its value, of at least one known number; they are sorted, but for a mean. NAN if one is unknown.
+double run_aggregate(const RunAggregate *aggregate, double *values, size_t count);
+
+// The 95 % confidence interval over all possible runs: of a mean by Student's t, of a quantile by
+// order statistics, whatever the distribution; NAN where there is none, as of a largest value.
+void run_aggregate_interval(const RunAggregate *aggregate, double *values, size_t count,
+                            double interval[2]);
+
 // Accuracy of the trajectories.
 typedef struct RunTrust {
     uint64_t whole;   // runs without a trust horizon before their end

@@ -58,7 +58,8 @@ static void encode_put_value(Bytes *bytes, const Field *field, const void *membe
         bytes_text(bytes, *(const bool *)member ? "true" : "false");
         break;
     case FIELD_KIND_TEXT:
-        bytes_json_string(bytes, *(char *const *)member);
+        bytes_json(bytes, (field->flags & FIELD_SCALARS) != 0 ? "%p" : "%s",
+                   *(char *const *)member);
         break;
     case FIELD_KIND_CHOICE:
         bytes_json_string(bytes, field->choices[*(const int *)member]);

@@ -290,6 +290,13 @@ static void decode_list_text(Decoder *decoder, const json_t *value, const char *
     bytes_clear(&text);
 }
 
+// A text under FIELD_SCALARS.
+static void decode_scalar(Decoder *decoder, const json_t *value, const Field *field, char **target,
+                          const char *place) {
+    free(*target);
+    decode_list_text(decoder, value, NULL, field, target, place);
+}
+
 static void decode_root(Decoder *decoder, const json_t *root, const Field *fields, void *item,
                         const char *pointer) {
     if (json_is_object(root))
@@ -489,7 +496,10 @@ static void decode_field(Decoder *decoder, const json_t *value, const Field *fie
         [FIELD_KIND_LIST] = decode_list,       [FIELD_KIND_ITEM] = decode_item,
         [FIELD_KIND_VARIANT] = decode_variant,
     };
-    kinds[field->kind](decoder, value, field, member, pointer);
+    if (field->kind == FIELD_KIND_TEXT && (field->flags & FIELD_SCALARS) != 0)
+        decode_scalar(decoder, value, field, member, pointer);
+    else
+        kinds[field->kind](decoder, value, field, member, pointer);
 }
 
 // Names the kinds that have the key, if `own` kind has not.

@@ -124,12 +124,16 @@ static void schema_reals(Bytes *bytes, SchemaUse use, const Field *field) {
     schema_length(bytes, field);
 }
 
+static const char *schema_text_type(const Field *field) {
+    return (field->flags & FIELD_SCALARS) != 0 ? "[\"number\",\"string\",\"boolean\"]"
+                                               : "\"string\"";
+}
+
 static void schema_strings(Bytes *bytes, const Field *field) {
     const bool has_pairs = (field->flags & FIELD_PAIRS) != 0;
     bytes_text(bytes, has_pairs ? ",\"anyOf\":[{" : "");
     bytes_text(bytes, ",\"type\":\"array\",\"items\":{\"type\":");
-    bytes_text(bytes, (field->flags & FIELD_SCALARS) != 0 ? "[\"number\",\"string\",\"boolean\"]"
-                                                          : "\"string\"");
+    bytes_text(bytes, schema_text_type(field));
     schema_choices(bytes, field);
     bytes_text(bytes, "}");
     schema_length(bytes, field);
@@ -194,7 +198,7 @@ static void schema_value(Bytes *bytes, SchemaUse use, const Field *field) {
             bytes_text(bytes, field->initial != 0 ? ",\"default\":true" : ",\"default\":false");
         break;
     case FIELD_KIND_TEXT:
-        bytes_text(bytes, ",\"type\":\"string\"");
+        bytes_format(bytes, ",\"type\":%s", schema_text_type(field));
         if (field->max > 0)
             bytes_format(bytes, ",\"maxLength\":%zu", field->max);
         break;

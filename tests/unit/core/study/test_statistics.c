@@ -145,3 +145,26 @@ TEST(trust_and_failures_are_counted) {
     }
     free(failures.at);
 }
+
+TEST(a_statistic_of_runs_has_the_interval_of_its_kind) {
+    double values[60], interval[2];
+    for (size_t i = 0; i < 60; i++)
+        values[i] = (double)((i * 37) % 60) + 1;
+    const RunAggregate mean = {false, (double)NAN}, max = {true, (double)NAN},
+                       median = {false, 0.5}, high = {false, 0.99};
+    assert_true(fabs(run_aggregate(&mean, values, 60) - 30.5) < 1e-12);
+    assert_true(run_aggregate(&max, values, 60) == 60);
+    assert_true(fabs(run_aggregate(&median, values, 60) - 30.5) < 1e-12);
+    run_aggregate_interval(&mean, values, 60, interval);
+    // t of 59 degrees of freedom times sqrt(60 * 61 / 12) / sqrt(60)
+    assert_true(fabs(interval[1] - 30.5 - 2.0010 * 17.4642 / sqrt(60)) < 1e-3);
+    // Of 60 coins, 21 and 39 are the ends of the tails of 2.5 %.
+    run_aggregate_interval(&median, values, 60, interval);
+    assert_true(interval[0] == 22 && interval[1] == 39);
+    run_aggregate_interval(&high, values, 60, interval);
+    assert_true(isnan(interval[0]) && isnan(interval[1]));
+    run_aggregate_interval(&max, values, 60, interval);
+    assert_true(isnan(interval[0]) && isnan(interval[1]));
+    values[3] = (double)NAN;
+    assert_true(isnan(run_aggregate(&max, values, 60)));
+}
