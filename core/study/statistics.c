@@ -123,8 +123,7 @@ static Status statistics_collect(const RunTable *table, int metric, Values *valu
     return STATUS_OK;
 }
 
-// Quantile of sorted values, at least one, linear between order statistics as numpy.quantile.
-static double statistics_quantile(const double *sorted, size_t count, double share) {
+double statistics_quantile(const double *sorted, size_t count, double share) {
     const double place = share * (double)(count - 1);
     const size_t below = (size_t)place;
     const double from = sorted[below], to = below + 1 < count ? sorted[below + 1] : from;

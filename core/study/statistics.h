@@ -83,6 +83,9 @@ typedef struct RunTrust {
 // One metric of a summary; NAN: unknown.
 double statistics_value(const Summary *summary, int metric);
 
+// Quantile of sorted values, at least one, linear between order statistics as numpy.quantile.
+double statistics_quantile(const double *sorted, size_t count, double share);
+
 // Fills the statistics of a metric. `statistic` holds its defaults, which remain where the known
 // values are too few, and the caller's `value`.
 Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic);

@@ -1,0 +1,535 @@
+// Run r levels + l is record r, scaled to level l. A limit is exceeded somewhere between the last
+// level below its first exceedance and that level (a curve may fall again); the lognormal
+// distribution of these levels is fitted to the intervals (lognormal_fit.h). Runs that failed say
+// nothing: they widen an interval.
+#include "core/study/fragility.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/json_pointer.h"
+#include "core/excitation/response_spectrum.h"
+#include "core/math/lognormal_fit.h"
+#include "core/study/statistics.h"
+
+enum { COST_RECORDS = 16, NAMES_SHOWN = 3 };
+
+static const double oscillator_steps_max = 1e8;
+static const double confidence = 0.95;
+static const char *const fragility_measure_names[] = {"pga", NULL};
+
+// clang-format off
+static const Field fragility_intensity_fields[] = {
+    FIELD_CHOICE(FragilityIntensity, measure, fragility_measure_names, OPTIONAL, "pga: the largest acceleration of the base"),
+    FIELD_REAL(FragilityIntensity, period, "s", WITHIN(0.01, 100), OPTIONAL, "in place of measure: the pseudo-acceleration of an oscillator of this period"),
+    FIELD_REAL(FragilityIntensity, damping_ratio, NULL, WITHIN(0, RESPONSE_SPECTRUM_DAMPING_MAX), OPTIONAL, "of the oscillator; 0.05 if absent"),
+    FIELD_END
+};
+
+static const Field fragility_levels_fields[] = {
+    FIELD_REALS(FragilityLevels, values, "m/s^2", ABOVE(0), FRAGILITY_LEVELS, PRESENCE_OPTIONAL, "intensities, rising"),
+    FIELD_REAL(FragilityLevels, from, "m/s^2", ABOVE(0), OPTIONAL, "in place of values: the lowest intensity"),
+    FIELD_REAL(FragilityLevels, to, "m/s^2", ABOVE(0), OPTIONAL, "the highest one"),
+    FIELD_COUNT(FragilityLevels, count, NULL, WITHIN(2, FRAGILITY_LEVELS), OPTIONAL, "their number, both ends included, at equal differences"),
+    FIELD_END
+};
+
+static const Field fragility_limit_fields[] = {
+    FIELD_CHOICE(FragilityLimit, metric, study_metric_names, REQUIRED, "metric of the summary"),
+    FIELD_REAL(FragilityLimit, value, NULL, AT_MIN(0), REQUIRED, "it is exceeded above this, in the metric's unit"),
+    FIELD_END
+};
+
+static const Field fragility_study_fields[] = {
+    FIELD_LIST_OR_NAMES(FragilityStudy, records, pinned_record_fields, "name", FRAGILITY_RECORDS, PRESENCE_REQUIRED, "ground motions that replace the scene's excitation"),
+    FIELD_ITEM(FragilityStudy, intensity, fragility_intensity_fields, "measure", PRESENCE_DEFAULT, "measure of a ground motion's strength, by which it is scaled; pga if absent"),
+    FIELD_ITEM(FragilityStudy, levels, fragility_levels_fields, "values", PRESENCE_REQUIRED, "intensities to which each record is scaled"),
+    FIELD_LIST(FragilityStudy, limits, fragility_limit_fields, FRAGILITY_LIMITS, PRESENCE_REQUIRED, "limit states"),
+    FIELD_END
+};
+
+static const Field fragility_point_fields[] = {
+    FIELD_REAL(FragilityPoint, level, "m/s^2", ANY, OPTIONAL, "intensity"),
+    FIELD_ITEM(FragilityPoint, metrics, study_metrics_fields, NULL, PRESENCE_DEFAULT, "of this run; unknown where it failed"),
+    FIELD_END
+};
+
+static const Field fragility_curve_fields[] = {
+    FIELD_TEXT(FragilityCurve, record, 0, PRESENCE_OPTIONAL, 0, "name"),
+    FIELD_REAL(FragilityCurve, intensity, "m/s^2", ANY, OPTIONAL, "of the record as it is: level over this is its factor"),
+    FIELD_LIST(FragilityCurve, points, fragility_point_fields, 0, PRESENCE_DEFAULT, "by rising level"),
+    FIELD_END
+};
+
+static const Field fragility_fractile_fields[] = {
+    FIELD_CHOICE(FragilityFractile, metric, study_metric_names, OPTIONAL, "metric of the summary"),
+    FIELD_REAL(FragilityFractile, level, "m/s^2", ANY, OPTIONAL, "intensity"),
+    FIELD_COUNT(FragilityFractile, count, NULL, AT_MIN(0), 0, "records whose value is known"),
+    FIELD_REAL(FragilityFractile, p16, NULL, ANY, OPTIONAL, "16 % of the records are below"),
+    FIELD_REAL(FragilityFractile, p50, NULL, ANY, OPTIONAL, "half of the records are below"),
+    FIELD_REAL(FragilityFractile, p84, NULL, ANY, OPTIONAL, "84 % of the records are below"),
+    FIELD_END
+};
+
+static const Field fragility_state_fields[] = {
+    FIELD_CHOICE(FragilityState, metric, study_metric_names, OPTIONAL, "metric of the summary"),
+    FIELD_REAL(FragilityState, value, NULL, ANY, OPTIONAL, "its limit"),
+    FIELD_COUNT(FragilityState, exceeded, NULL, AT_MIN(0), 0, "records that exceed it at some level"),
+    FIELD_REAL(FragilityState, median, "m/s^2", ANY, OPTIONAL, "intensity at which half of all ground motions exceed it"),
+    FIELD_REALS(FragilityState, median_interval_95, "m/s^2", ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval"),
+    FIELD_REAL(FragilityState, dispersion, NULL, ANY, OPTIONAL, "standard deviation of the logarithm of that intensity"),
+    FIELD_REALS(FragilityState, dispersion_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval"),
+    FIELD_END
+};
+
+static const Field fragility_failure_fields[] = {
+    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
+    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
+    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them, from 0, record by record"},
+    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
+    FIELD_END
+};
+
+static const Field fragility_answer_fields[] = {
+    FIELD_COUNT(Fragility, runs, NULL, AT_MIN(0), 0, "runs made"),
+    FIELD_COUNT(Fragility, failed, NULL, AT_MIN(0), 0, "runs that failed"),
+    FIELD_REAL(Fragility, steps, NULL, ANY, 0, "solver steps of all runs"),
+    FIELD_LIST(Fragility, failures, fragility_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
+    FIELD_ITEM(Fragility, intensity, fragility_intensity_fields, NULL, PRESENCE_DEFAULT, "measure of the levels"),
+    FIELD_LIST(Fragility, curves, fragility_curve_fields, 0, PRESENCE_DEFAULT, "record by record"),
+    FIELD_LIST(Fragility, fractiles, fragility_fractile_fields, 0, PRESENCE_DEFAULT, "metric by metric, by rising level"),
+    FIELD_LIST(Fragility, limits, fragility_state_fields, 0, PRESENCE_DEFAULT, "limit states: lognormal distributions by maximum likelihood"),
+    FIELD_LIST(Fragility, warnings, warning_fields, 0, PRESENCE_DEFAULT, "what weakens the answer"),
+    FIELD_END
+};
+// clang-format on
+
+static size_t fragility_level_count(const FragilityLevels *levels) {
+    return levels->values.count > 0 ? levels->values.count : (size_t)levels->count;
+}
+
+static double fragility_level(const FragilityLevels *levels, size_t index) {
+    if (levels->values.count > 0)
+        return levels->values.at[index];
+    return index + 1 == levels->count
+               ? levels->to
+               : levels->from +
+                     (levels->to - levels->from) / (double)(levels->count - 1) * (double)index;
+}
+
+static const NamedRecord *fragility_record(const FragilityStudy *study, size_t index) {
+    return (const NamedRecord *)(const void *)study->records.at[index].named;
+}
+
+// --- the request ---
+
+static Status fragility_complete_intensity(FragilityIntensity *intensity, Problem *problem) {
+    const bool has_period = !isnan(intensity->period);
+    if (intensity->measure != CHOICE_ABSENT && has_period)
+        return problem_add(problem, STATUS_INVALID, "/study/intensity",
+                           "has a measure and a period: leave one of them out");
+    if (!has_period && !isnan(intensity->damping_ratio))
+        return problem_add(problem, STATUS_INVALID, "/study/intensity/damping_ratio",
+                           "needs the period of the oscillator");
+    if (!has_period)
+        intensity->measure = 0;
+    else if (isnan(intensity->damping_ratio))
+        intensity->damping_ratio = 0.05;
+    return STATUS_OK;
+}
+
+static Status fragility_check_levels(const FragilityLevels *levels, Problem *problem) {
+    const char *place = "/study/levels";
+    const bool has_range =
+        !isnan(levels->from) || !isnan(levels->to) || levels->count != COUNT_ABSENT;
+    if (levels->values.count > 0 && has_range)
+        return problem_add(problem, STATUS_INVALID, place,
+                           "has values and a range: leave out values, or from, to and count");
+    for (size_t i = 1; i < levels->values.count; i++)
+        if (!(levels->values.at[i] > levels->values.at[i - 1]))
+            return problem_add_real(problem, STATUS_INVALID, json_pointer_at("/study/levels", i).at,
+                                    levels->values.at[i], "m/s^2",
+                                    "must be above the one before it: levels rise");
+    if (levels->values.count > 0)
+        return STATUS_OK;
+    if (isnan(levels->from) || isnan(levels->to) || levels->count == COUNT_ABSENT)
+        return problem_add(problem, STATUS_INVALID, place,
+                           "needs a list of intensities, or a range of from, to and count");
+    if (!(levels->from < levels->to))
+        return problem_add(problem, STATUS_INVALID, place,
+                           "from must be below to, is %s m/s^2, to is %s m/s^2",
+                           real_text(levels->from).at, real_text(levels->to).at);
+    return STATUS_OK;
+}
+
+static Status fragility_check_records(const FragilityStudy *study, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < study->records.count; i++) {
+        const JsonPointer place = json_pointer_at("/study/records", i);
+        const NamedRecord *record = fragility_record(study, i);
+        size_t first = 0;
+        while (first < i && strcmp(study->records.at[first].name, study->records.at[i].name) != 0)
+            first++;
+        if (record == NULL)
+            status = problem_add(problem, STATUS_INVALID, place.at, "is not known here");
+        else if (first < i)
+            status = problem_add(problem, STATUS_INVALID, place.at,
+                                 "is listed twice, first at /study/records/%zu", first);
+        else if (!(record->peak > 0))
+            status = problem_add(problem, STATUS_INVALID, place.at,
+                                 "is a base at rest, which no factor scales to a level");
+    }
+    return status;
+}
+
+static Status fragility_check_limits(const FragilityStudy *study, const Simulation *simulation,
+                                     Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < study->limits.count; i++) {
+        const int metric = study->limits.at[i].metric;
+        const JsonPointer place = json_pointer_of(json_pointer_at("/study/limits", i).at, "metric");
+        const Status own =
+            study_metric_is_reduction(metric)
+                ? problem_add(problem, STATUS_INVALID, place.at,
+                              "must be a metric that grows with the intensity: a reduction is "
+                              "compared with another run")
+                : study_metric_check(simulation, metric, place.at, problem);
+        status = own != STATUS_OK ? own : status;
+    }
+    return status;
+}
+
+// The time to find the intensities.
+static Status fragility_check_oscillators(const FragilityStudy *study, Problem *problem) {
+    double steps = 0;
+    for (size_t i = 0; i < study->records.count && !isnan(study->intensity.period); i++) {
+        const NamedRecord *record = fragility_record(study, i);
+        steps += response_spectrum_steps(&study->intensity.period, 1, record->samples.count,
+                                         record->interval);
+    }
+    if (steps <= oscillator_steps_max)
+        return STATUS_OK;
+    return problem_add_real(problem, STATUS_INVALID, "/study/intensity/period",
+                            study->intensity.period, "s",
+                            "would take %.3g steps of an oscillator to measure the records, at "
+                            "most %.3g are allowed: take a longer period or fewer records",
+                            steps, oscillator_steps_max);
+}
+
+static Status fragility_check_runs(const FragilityStudy *study, Problem *problem) {
+    const size_t levels = fragility_level_count(&study->levels);
+    if (study->records.count * levels <= FRAGILITY_RUNS)
+        return STATUS_OK;
+    return problem_add(problem, STATUS_INVALID, "/study/levels",
+                       "are %zu, which are %zu runs of %zu records, at most %d are allowed: take "
+                       "fewer levels or records",
+                       levels, study->records.count * levels, study->records.count,
+                       (int)FRAGILITY_RUNS);
+}
+
+// The scene of a record at a factor, completed. Cleared by simulation_clear in any case.
+static Status fragility_make_scene(const Simulation *base, const PinnedRecord *record,
+                                   double factor, const SimulationLimits *limits, Simulation *scene,
+                                   Problem *problem) {
+    TRY(fields_copy(simulation_fields, base, scene));
+    TRY(study_scene_use_record(scene, record));
+    ((ExcitationRecord *)(void *)scene->scene.excitation)->scale = factor;
+    return simulation_complete(scene, limits, NULL, problem);
+}
+
+// The scene that all runs start from: without output, and with the first record, so that its own
+// samples are not copied for each.
+static Status fragility_base(const FragilityStudy *study, const Simulation *simulation,
+                             Simulation *base) {
+    TRY(study_run_copy(simulation, base));
+    texts_clear(&base->output.psd.channels);
+    base->output.impacts = false;
+    return study_scene_use_record(base, &study->records.at[0]);
+}
+
+static Status fragility_complete(void *request, const Simulation *simulation,
+                                 const SimulationLimits *limits, Problem *problem) {
+    FragilityStudy *study = request;
+    const Status faults[] = {fragility_complete_intensity(&study->intensity, problem),
+                             fragility_check_levels(&study->levels, problem),
+                             fragility_check_limits(study, simulation, problem),
+                             fragility_check_records(study, problem)};
+    TRY(status_first(faults, COUNT(faults)));
+    TRY(fragility_check_oscillators(study, problem));
+    TRY(fragility_check_runs(study, problem));
+    Simulation base = {0}, scene = {0};
+    Status status = fragility_base(study, simulation, &base);
+    if (status == STATUS_OK)
+        status = fragility_make_scene(&base, &study->records.at[0], 1, limits, &scene, problem);
+    simulation_clear(&base);
+    simulation_clear(&scene);
+    return status;
+}
+
+// From a sample of the records.
+static Status fragility_cost(const void *request, const Simulation *simulation,
+                             const SimulationLimits *limits, double *steps) {
+    const FragilityStudy *study = request;
+    const size_t count = study->records.count,
+                 samples = count < COST_RECORDS ? count : COST_RECORDS;
+    Simulation base = {0};
+    double sum = 0;
+    size_t made = 0;
+    Status status = fragility_base(study, simulation, &base);
+    for (size_t i = 0; i < samples && status == STATUS_OK; i++) {
+        Simulation scene = {0};
+        status = fragility_make_scene(&base, &study->records.at[i * count / samples], 1, limits,
+                                      &scene, NULL);
+        if (status == STATUS_OK) {
+            sum += simulation_cost(&scene).steps;
+            made++;
+        }
+        simulation_clear(&scene);
+        status = status == STATUS_NO_MEMORY ? status : STATUS_OK;
+    }
+    simulation_clear(&base);
+    *steps = made > 0 ? sum / (double)made * (double)count *
+                            (double)fragility_level_count(&study->levels)
+                      : 0;
+    return status;
+}
+
+static void fragility_references(void *request, StudyReferences *references) {
+    FragilityStudy *study = request;
+    *references = (StudyReferences){.suite = &study->records, .suite_place = "/study/records"};
+}
+
+// --- the work ---
+
+typedef struct FragilityWork {
+    StudyWork work;
+    const FragilityStudy *study;
+    Fragility *answer;
+    size_t levels;
+    Simulation base;
+} FragilityWork;
+
+// Measures the records.
+static Status fragility_measure(FragilityWork *work, const StudyTools *tools, Problem *problem) {
+    const FragilityIntensity *intensity = &work->study->intensity;
+    const size_t count = work->study->records.count;
+    for (size_t i = 0; i < count; i++) {
+        const NamedRecord *record = fragility_record(work->study, i);
+        FragilityCurve *curve = list_append(&work->answer->curves, sizeof *curve);
+        TRY(status_made(curve != NULL));
+        TRY(text_copy(record->name, &curve->record));
+        curve->intensity = record->peak;
+        TRY(study_advance(tools->progress, (double)i / (double)count, problem));
+        if (!isnan(intensity->period) &&
+            response_spectrum_acceleration(&record->samples, record->interval,
+                                           intensity->damping_ratio, intensity->period,
+                                           tools->progress, &curve->intensity) != STATUS_OK)
+            return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+        curve->points.at = calloc(work->levels, sizeof *curve->points.at);
+        TRY(status_made(curve->points.at != NULL));
+        curve->points.count = work->levels;
+        for (size_t l = 0; l < work->levels; l++) {
+            FragilityPoint *point = &curve->points.at[l];
+            point->level = fragility_level(&work->study->levels, l);
+            for (int m = 0; m < STUDY_METRIC_COUNT; m++)
+                point->metrics.of[m] = (double)NAN;
+        }
+    }
+    return STATUS_OK;
+}
+
+// Warns of records that last longer than the scene.
+static Status fragility_warn_of_ends(FragilityWork *work) {
+    const double duration = work->work.simulation->scene.duration;
+    char names[200] = "";
+    size_t count = 0;
+    for (size_t i = 0; i < work->study->records.count; i++) {
+        const NamedRecord *record = fragility_record(work->study, i);
+        if ((double)(record->samples.count - 1) * record->interval <= duration * (1 + 1e-9))
+            continue;
+        if (count++ < NAMES_SHOWN)
+            text_list(names, sizeof names, record->name);
+    }
+    if (count == 0)
+        return STATUS_OK;
+    return warnings_add(&work->answer->warnings, "/duration",
+                        "ends before %zu of the records (%s%s): their ends are left out", count,
+                        names, count > NAMES_SHOWN ? ", ..." : "");
+}
+
+static Status fragility_begin(void *of, const StudyTools *tools, Problem *problem) {
+    FragilityWork *work = of;
+    work->study = work->work.study;
+    work->answer = work->work.answer;
+    work->levels = fragility_level_count(&work->study->levels);
+    work->answer->intensity = work->study->intensity;
+    TRY(fragility_base(work->study, work->work.simulation, &work->base));
+    TRY(fragility_measure(work, tools, problem));
+    TRY(fragility_warn_of_ends(work));
+    work->work.members = work->study->records.count * work->levels;
+    work->work.part_bytes = sizeof(StudyPart);
+    work->work.bytes = work->work.members * sizeof(FragilityPoint);
+    return STATUS_OK;
+}
+
+static Status fragility_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
+                              Problem *problem) {
+    const FragilityWork *work = of;
+    const size_t record = member / work->levels;
+    const FragilityCurve *curve = &work->answer->curves.at[record];
+    (void)part;
+    return fragility_make_scene(&work->base, &work->study->records.at[record],
+                                curve->points.at[member % work->levels].level / curve->intensity,
+                                work->work.limits, scene, problem);
+}
+
+static Status fragility_fold(void *of, size_t member, StudyPart *part) {
+    FragilityWork *work = of;
+    Fragility *answer = work->answer;
+    const RunRecord *run = &part->run;
+    answer->runs++;
+    if (run->status != STATUS_OK) {
+        answer->failed++;
+        return study_failures_add(&answer->failures, (int)run->status, status_slug(run->status),
+                                  member, run->why);
+    }
+    answer->steps += run->steps;
+    answer->curves.at[member / work->levels].points.at[member % work->levels].metrics =
+        study_metrics_of(run);
+    return STATUS_OK;
+}
+
+// --- the answer ---
+
+// Values of a metric at a level, sorted; returns how many are known.
+static size_t fragility_values(const Fragility *answer, size_t level, int metric, double *values) {
+    size_t count = 0;
+    for (size_t r = 0; r < answer->curves.count; r++) {
+        const double value = answer->curves.at[r].points.at[level].metrics.of[metric];
+        if (!isnan(value))
+            values[count++] = value;
+    }
+    reals_sort(values, count);
+    return count;
+}
+
+// Of metrics that are known somewhere.
+static Status fragility_add_fractiles(FragilityWork *work, int metric, double *values) {
+    Fragility *answer = work->answer;
+    size_t known = 0;
+    for (size_t l = 0; l < work->levels && known == 0; l++)
+        known = fragility_values(answer, l, metric, values);
+    for (size_t l = 0; l < work->levels && known > 0; l++) {
+        const size_t count = fragility_values(answer, l, metric, values);
+        FragilityFractile *fractile = list_append(&answer->fractiles, sizeof *fractile);
+        TRY(status_made(fractile != NULL));
+        *fractile = (FragilityFractile){metric,      answer->curves.at[0].points.at[l].level,
+                                        count,       (double)NAN,
+                                        (double)NAN, (double)NAN};
+        if (count == 0)
+            continue;
+        fractile->p16 = statistics_quantile(values, count, 0.16);
+        fractile->p50 = statistics_quantile(values, count, 0.5);
+        fractile->p84 = statistics_quantile(values, count, 0.84);
+    }
+    return STATUS_OK;
+}
+
+// Where a record first exceeds a limit.
+static CensoredNumber fragility_interval(const FragilityCurve *curve, const FragilityLimit *limit) {
+    CensoredNumber interval = {0, (double)INFINITY};
+    for (size_t l = 0; l < curve->points.count; l++) {
+        const FragilityPoint *point = &curve->points.at[l];
+        const double value = point->metrics.of[limit->metric];
+        if (value > limit->value) {
+            interval.high = point->level;
+            break;
+        }
+        if (value <= limit->value)
+            interval.low = point->level;
+    }
+    return interval;
+}
+
+// Why there is no distribution.
+static const char *fragility_reason(const CensoredNumber *intervals, size_t count,
+                                    size_t exceeded) {
+    size_t below = 0;
+    for (size_t i = 0; i < count; i++)
+        below += intervals[i].low > 0;
+    return exceeded == 0 ? "no record exceeds it: take higher levels"
+           : below == 0  ? "every record exceeds it at the lowest level: take lower levels"
+                         : "the levels do not tell the records apart: take more levels around the "
+                           "exceedance, or more records";
+}
+
+static Status fragility_add_state(FragilityWork *work, size_t index, CensoredNumber *intervals) {
+    Fragility *answer = work->answer;
+    const FragilityLimit *limit = &work->study->limits.at[index];
+    FragilityState *state = list_append(&answer->limits, sizeof *state);
+    TRY(status_made(state != NULL));
+    *state = (FragilityState){.metric = limit->metric,
+                              .value = limit->value,
+                              .median = (double)NAN,
+                              .dispersion = (double)NAN};
+    size_t count = 0;
+    for (size_t r = 0; r < answer->curves.count; r++) {
+        const CensoredNumber interval = fragility_interval(&answer->curves.at[r], limit);
+        if (interval.low > 0 || interval.high < (double)INFINITY)
+            intervals[count++] = interval;
+        state->exceeded += interval.high < (double)INFINITY;
+    }
+    LognormalFit fit;
+    if (!lognormal_fit(intervals, count, confidence, &fit))
+        return warnings_add(&answer->warnings, json_pointer_at("/study/limits", index).at,
+                            "median and dispersion are unknown: %s",
+                            fragility_reason(intervals, count, state->exceeded));
+    state->median = fit.median;
+    state->dispersion = fit.dispersion;
+    TRY(study_copy_reals(fit.median_interval, 2, &state->median_interval_95));
+    return study_copy_reals(fit.dispersion_interval, 2, &state->dispersion_interval_95);
+}
+
+static Status fragility_end(void *of, const StudyTools *tools, Problem *problem) {
+    FragilityWork *work = of;
+    const size_t records = work->study->records.count;
+    double *values = calloc(records, sizeof *values);
+    CensoredNumber *intervals = calloc(records, sizeof *intervals);
+    Status status = status_made(values != NULL && intervals != NULL);
+    for (int m = 0; m < STUDY_METRIC_COUNT && status == STATUS_OK; m++) {
+        status = study_advance(tools->progress, 1, problem);
+        if (status == STATUS_OK)
+            status = fragility_add_fractiles(work, m, values);
+    }
+    for (size_t i = 0; i < work->study->limits.count && status == STATUS_OK; i++)
+        status = fragility_add_state(work, i, intervals);
+    free(values);
+    free(intervals);
+    return status;
+}
+
+static void fragility_free(void *of) {
+    FragilityWork *work = of;
+    simulation_clear(&work->base);
+}
+
+const StudyKind study_fragility = {
+    .kind = {"fragility",
+             "a suite of ground motions at rising intensities, and the limits exceeded",
+             fragility_study_fields, sizeof(FragilityStudy)},
+    .answer = &(const Kind){"fragility", "curves of all records, and the fitted distributions",
+                            fragility_answer_fields, sizeof(Fragility)},
+    .shorten = "take fewer records or levels, or a shorter duration",
+    .references = fragility_references,
+    .max_runs = 1000,
+    .complete = fragility_complete,
+    .cost = fragility_cost,
+    .work_size = sizeof(FragilityWork),
+    .part_size = sizeof(StudyPart),
+    .begin = fragility_begin,
+    .scene = fragility_scene,
+    .fold = fragility_fold,
+    .end = fragility_end,
+    .free = fragility_free,
+};
