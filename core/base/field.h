@@ -151,8 +151,8 @@ struct Field {
     // TEXT: bytes; REALS, TEXTS, LIST: elements; ROWS: rows, and numbers in each; 0: no limit
     size_t max;
     const KindTable *kinds; // VARIANT
-    const char
-        *shorthand; // ITEM, LIST: a JSON string instead of an object sets this TEXT or CHOICE row
+    const char *shorthand; // ITEM, LIST: a JSON string or array instead of an object sets this TEXT
+                           // or CHOICE, or REALS row
     int flags;
     const char *doc;
 };

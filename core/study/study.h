@@ -173,7 +173,7 @@ extern const StudyKind *const studies[]; // NULL-terminated
 const StudyKind *study_of_answer(const Kind *answer);
 extern const KindTable study_kinds, study_answer_kinds;
 extern const StudyKind study_tradeoff, study_ensemble, study_compare, study_sensitivity,
-    study_sweep, study_calibrate, study_response, study_optimize;
+    study_sweep, study_calibrate, study_response, study_optimize, study_fragility;
 
 static inline const StudyKind *study_kind(const Variant *study) {
     return (const StudyKind *)(const void *)study->kind;

@@ -308,9 +308,16 @@ static void decode_root(Decoder *decoder, const json_t *root, const Field *field
 static void decode_list(Decoder *decoder, const json_t *value, const Field *field, void *target,
                         const char *pointer);
 
-// A string under a shorthand stands for an object with that member alone.
+// Whether the shorthand of an item is a list of numbers.
+static bool decode_has_short_list(const Field *field) {
+    return field->shorthand != NULL &&
+           fields_find(field->fields, field->shorthand, NULL)->kind == FIELD_KIND_REALS;
+}
+
+// A string, or a list of numbers, under a shorthand stands for an object with that member alone.
 static bool decode_is_short(const json_t *value, const Field *field) {
-    return json_is_string(value) && field->shorthand != NULL;
+    return field->shorthand != NULL &&
+           (decode_has_short_list(field) ? json_is_array(value) : json_is_string(value));
 }
 
 static void decode_short(Decoder *decoder, const json_t *value, const Field *field, void *item,
@@ -417,9 +424,10 @@ static void decode_item(Decoder *decoder, const json_t *value, const Field *fiel
     }
     if (!json_is_object(value) && !is_short) {
         decode_wrong_type(decoder, pointer, value, NULL,
-                          takes_null                 ? "an object or null"
-                          : field->shorthand != NULL ? "an object or a string"
-                                                     : "an object");
+                          takes_null                     ? "an object or null"
+                          : decode_has_short_list(field) ? "an object or an array of numbers"
+                          : field->shorthand != NULL     ? "an object or a string"
+                                                         : "an object");
         return;
     }
     // An item that is absent gets the defaults of its members when it appears.

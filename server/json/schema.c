@@ -52,6 +52,7 @@ const SchemaDocument schema_documents[] = {
     {"ensemble", "Answer of the study ensemble", NULL, &study_ensemble},
     {"compare", "Answer of the study compare", NULL, &study_compare},
     {"sensitivity", "Answer of the study sensitivity", NULL, &study_sensitivity},
+    {"fragility", "Answer of the study fragility", NULL, &study_fragility},
     {NULL, NULL, NULL, NULL},
 };
 // clang-format on
@@ -148,8 +149,8 @@ static void schema_strings(Bytes *bytes, const Field *field) {
         schema_texts(bytes, "default", field->initial_texts);
 }
 
-// An object; with a shorthand also the string of the row it stands for, and null where it is
-// allowed.
+// An object; with a shorthand also the string or list of the row it stands for, and null where it
+// is allowed.
 static void schema_item(Bytes *bytes, SchemaUse use, const Field *field) {
     const bool takes_null = (field->flags & FIELD_NULL_IS_EMPTY) != 0 && use == SCHEMA_READ;
     const bool is_named = field->shorthand != NULL && use == SCHEMA_READ;
@@ -158,8 +159,11 @@ static void schema_item(Bytes *bytes, SchemaUse use, const Field *field) {
     schema_object(bytes, use, field->fields, NULL, NULL);
     if (is_named) {
         const Field *row = fields_find(field->fields, field->shorthand, NULL);
-        bytes_text(bytes, "},{\"type\":\"string\"");
-        if (row->kind == FIELD_KIND_CHOICE)
+        const bool is_list = row->kind == FIELD_KIND_REALS;
+        bytes_text(bytes, is_list ? "},{" : "},{\"type\":\"string\"");
+        if (is_list)
+            schema_reals(bytes, use, row);
+        else if (row->kind == FIELD_KIND_CHOICE)
             schema_texts(bytes, "enum", row->choices);
         else if (row->max > 0)
             bytes_format(bytes, ",\"maxLength\":%zu", row->max);
