@@ -172,7 +172,7 @@ static Status fragility_check_records(const FragilityStudy *study, Problem *prob
         while (first < i && strcmp(study->records.at[first].name, study->records.at[i].name) != 0)
             first++;
         if (record == NULL)
-            status = problem_add(problem, STATUS_INVALID, place.at, "is not known here");
+            status = STATUS_INVALID; // reported where the names are resolved
         else if (first < i)
             status = problem_add(problem, STATUS_INVALID, place.at,
                                  "is listed twice, first at /study/records/%zu", first);

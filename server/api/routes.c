@@ -72,6 +72,8 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/compare",              "read",   NULL,         "The study's variants or chart, format by Accept", results_study, NULL},
     {"GET",    "/v1/results/{id}/sensitivity.{format}", "read",   NULL,         "The study's slopes and bands as json, the slopes as csv, or its chart as svg", results_study, NULL},
     {"GET",    "/v1/results/{id}/sensitivity",          "read",   NULL,         "The study's slopes or chart, format by Accept", results_study, NULL},
+    {"GET",    "/v1/results/{id}/fragility.{format}",   "read",   NULL,         "The study's curves and distributions as json, its runs as csv or npz, or its chart as svg", results_study, NULL},
+    {"GET",    "/v1/results/{id}/fragility",            "read",   NULL,         "The study's curves, runs or chart, format by Accept", results_study, NULL},
     {"GET",    "/v1/compare",                           "read",   of_compare,   "Compare two results and their inputs", compare_results, NULL},
     {"POST",   "/v1/compare",                           "read",   of_measured,  "Compare a result with a measured motion", compare_measured, NULL},
     {"GET",    "/v1/cache",                             "read",   NULL,         "Hits and misses of the caches, by layer", cache_show, NULL},

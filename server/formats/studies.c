@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/study/ensemble.h"
+#include "core/study/fragility.h"
 #include "core/study/model_comparison.h"
 #include "core/study/sensitivity.h"
 #include "server/jobs/documents.h"
@@ -121,6 +122,29 @@ static void sweep_chart(const Variant *answer, Bytes *bytes) {
     (void)chart_sweep(&document, bytes);
 }
 
+// A row for each run.
+static void fragility_table(const Variant *variant, StudyTable *table) {
+    const Fragility *answer = (const Fragility *)(const void *)variant;
+    size_t columns[STUDY_METRIC_COUNT], row = 0;
+    for (size_t r = 0; r < answer->curves.count; r++)
+        table->rows += answer->curves.at[r].points.count;
+    const size_t record = study_table_add(table, "record", NULL),
+                 level = study_table_add(table, "level", "m/s^2");
+    for (int m = 0; m < STUDY_METRIC_COUNT; m++)
+        if (!study_metric_is_reduction(m))
+            columns[m] = study_table_add(table, study_metric_names[m], study_metric_unit(m));
+    for (size_t r = 0; r < answer->curves.count; r++) {
+        const FragilityCurve *curve = &answer->curves.at[r];
+        for (size_t l = 0; l < curve->points.count; l++, row++) {
+            study_table_set_word(table, record, row, curve->record);
+            study_table_set(table, level, row, curve->points.at[l].level);
+            for (int m = 0; m < STUDY_METRIC_COUNT; m++)
+                if (!study_metric_is_reduction(m))
+                    study_table_set(table, columns[m], row, curve->points.at[l].metrics.of[m]);
+        }
+    }
+}
+
 static const char csv_type[] = "text/csv; charset=utf-8";
 
 static const struct {
@@ -154,6 +178,12 @@ static const struct {
      {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, sensitivity_csv},
       {"svg", chart_type, false, chart_sensitivity}}},
+    {&study_fragility,
+     fragility_table,
+     {{"json", "application/json", false, NULL},
+      {"csv", csv_type, false, NULL},
+      {"npz", "application/x-npz", true, NULL},
+      {"svg", chart_type, false, chart_fragility}}},
     {NULL, NULL, {{"json", "application/json", false, NULL}}}, // of any other
 };
 

@@ -87,6 +87,8 @@ void chart_ensemble(const Variant *answer, Bytes *bytes);
 void chart_compare(const Variant *answer, Bytes *bytes);
 // The spectra of the drawn runs, and a table of the slopes.
 void chart_sensitivity(const Variant *answer, Bytes *bytes);
+// The probability of exceeding each limit over the intensity, and the fractiles of the metrics.
+void chart_fragility(const Variant *answer, Bytes *bytes);
 // Each metric of a sweep: a line over one axis, or a map over two. Size and memory are limited for
 // any number of points. False: the rows could not be read to their end.
 bool chart_sweep(const SweepDocument *document, Bytes *bytes);

@@ -168,6 +168,10 @@ def test_real_answers_have_the_promised_shapes():
 
         shake = {"name": "shake", "interval": 0.02, "samples": [0, 1, -2, 1, 0]}
         assert call("POST", "/v1/records", "/v1/records", json=shake) == {"Location"}
+        fragile = {**program.scene("no_damper"), "duration": 1, "study": {
+            "kind": "fragility", "records": ["shake"], "levels": [1, 2], "limits": [{"metric": "peak_displacement", "value": 1}]}}
+        studies["fragility"] = {"id": program.finished(daemon, fragile)["result"]}
+        values.update({f"/v1/results/{{id}}/fragility{ending}": studies["fragility"] for ending in ("", ".{format}")})
 
         drops = {"drops": [{"drop_height": 0.1, "rebound_height": 0.04, "contact_time": 0.001}]}
         measurements = "/v1/materials/{slug}/measurements"
