@@ -169,7 +169,7 @@ part_browser() {
 part_bench() {
     build release
     local bench
-    for bench in exact frame power peers summary encode; do
+    for bench in exact frame power peers summary response encode; do
         if [ -z "$is_quick" ] || [ "$bench" = encode ]; then check build/tests/bench_$bench; fi
     done
     sized '1 5' '1 500' build/tests/bench_cost

@@ -73,6 +73,8 @@ static const Field response_failure_fields[] = {
 };
 
 static const Field response_answer_fields[] = {
+    FIELD_TEXT(ResponseCurve, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member that varies, the first of tied ones"),
+    FIELD_TEXT(ResponseCurve, unit, 0, PRESENCE_OPTIONAL, 0, "of its values"),
     FIELD_COUNT(ResponseCurve, runs, NULL, AT_MIN(0), 0, "points made"),
     FIELD_COUNT(ResponseCurve, failed, NULL, AT_MIN(0), 0, "of these without a result"),
     FIELD_LIST(ResponseCurve, failures, response_failure_fields, 0, PRESENCE_DEFAULT, "points that failed, by their reason"),
@@ -118,11 +120,21 @@ static size_t curve_state_size(const Simulation *simulation) {
                 scene->dampers.count);
 }
 
+// The row of the number that varies; NULL, and a fault, if there is none.
+static const Field *curve_axis_field(const StudyAxis *axis, const Simulation *simulation,
+                                     Problem *problem) {
+    Simulation scene;
+    bool is_tag;
+    if (fields_copy(simulation_fields, simulation, &scene) != STATUS_OK)
+        return NULL;
+    const Field *field = study_axis_find(axis, &scene, &is_tag, "/study/axis", problem);
+    simulation_clear(&scene);
+    return field;
+}
+
 static Status curve_check_axis(const StudyAxis *axis, const Simulation *simulation,
                                Problem *problem) {
     static const char place[] = "/study/axis";
-    bool is_tag;
-    Simulation scene;
     TRY(study_axis_check(axis, true, place, problem));
     if (axis->values.count > 0)
         return problem_add(problem, STATUS_INVALID, "/study/axis/values",
@@ -133,11 +145,9 @@ static Status curve_check_axis(const StudyAxis *axis, const Simulation *simulati
     if (!(axis->from < axis->to))
         return problem_add(problem, STATUS_INVALID, place,
                            "from must be below to: direction down follows it in reverse");
-    TRY(fields_copy(simulation_fields, simulation, &scene));
-    const Field *field = study_axis_find(axis, &scene, &is_tag, place, problem);
-    simulation_clear(&scene);
+    const Field *field = curve_axis_field(axis, simulation, problem);
     if (field == NULL)
-        return STATUS_INVALID;
+        return problem->count > 0 ? STATUS_INVALID : STATUS_NO_MEMORY;
     if (field->kind != FIELD_KIND_REAL && field->kind != FIELD_KIND_REALS)
         return json_pointer_fault(problem, place, "pointer",
                                   "must be that of a real number: only such a number can vary "
@@ -596,6 +606,10 @@ static Status curve_begin(void *of, const StudyTools *tools, Problem *problem) {
     work->problem = problem;
     work->range = (ProgressRange){tools->progress, 0, 0, 0};
     work->progress = progress_range_view(&work->range);
+    const Field *field = curve_axis_field(&study->axis, work->work.simulation, problem);
+    TRY(status_made(field != NULL));
+    TRY(text_copy(field->unit, &work->answer->unit));
+    TRY(text_copy(study_axis_pointer(&study->axis, 0), &work->answer->pointer));
     if (study->direction != CURVE_DOWN)
         TRY(curve_sweep(work, CURVE_UP));
     if (study->direction != CURVE_UP)

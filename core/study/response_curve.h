@@ -49,6 +49,7 @@ typedef struct ResponsePoints {
 // The answer.
 typedef struct ResponseCurve {
     Variant variant;
+    char *pointer, *unit; // of the axis, of its first member; unit NULL: none
     uint64_t runs, failed;
     StudyFailures failures;
     ResponsePoints points;

@@ -173,6 +173,8 @@ static const struct {
      {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, compare_csv},
       {"svg", chart_type, false, chart_compare}}},
+    {&study_response,
+     {{"json", "application/json", false, json_write}, {"svg", chart_type, false, chart_response}}},
     {&study_sensitivity,
      NULL,
      {{"json", "application/json", false, NULL},

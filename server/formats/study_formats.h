@@ -85,6 +85,8 @@ void chart_tradeoff(const Variant *answer, Bytes *bytes);
 void chart_ensemble(const Variant *answer, Bytes *bytes);
 // The spectra and the displacements of all variants.
 void chart_compare(const Variant *answer, Bytes *bytes);
+// Amplitudes over the axis with and without dampers, unstable ones dashed, and the sections.
+void chart_response(const Variant *answer, Bytes *bytes);
 // The spectra of the drawn runs, and a table of the slopes.
 void chart_sensitivity(const Variant *answer, Bytes *bytes);
 // The probability of exceeding each limit over the intensity, and the fractiles of the metrics.
