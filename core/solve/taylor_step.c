@@ -117,6 +117,10 @@ static void taylor_step_make_order(TaylorStep *arc, const ModalState *state, siz
     }
 }
 
+static bool taylor_step_is_single(const ModalState *state) {
+    return state->mode_count == 1 && state->dampers == 1 && state->diagonal != NULL;
+}
+
 // All orders of one mode and one damper: the same bytes as those of the loops below, in a third of
 // the time, half of that of a motion followed by cycle_flow.h.
 static void taylor_step_make_single(TaylorStep *arc, const ModalState *state) {
@@ -164,7 +168,7 @@ void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *sli
         arc->r[d * ROW] = is_resting ? 0 : state->damper[d].r;
         arc->r[d * ROW + 1] = is_resting ? 0 : state->damper[d].w * length;
     }
-    if (state->mode_count == 1 && m == 1 && state->diagonal != NULL) {
+    if (taylor_step_is_single(state)) {
         taylor_step_make_single(arc, state);
         return;
     }
@@ -193,8 +197,31 @@ void taylor_step_cut(TaylorStep *arc, const ModalState *state, double s) {
     arc->rho *= s;
 }
 
+// The end of a step of one mode and one damper: the same bytes as those of the loops below.
+static void taylor_step_end_single(const TaylorStep *arc, ModalState *state) {
+    const double *r = arc->r, *q = arc->q + arc->degree * state->padded;
+    double sum[4] = {0, 0, 0, 0};
+    for (size_t k = arc->degree; k > 0; k--, q -= state->padded) {
+        sum[0] += *q;
+        sum[1] += (double)k * *q;
+        sum[2] += r[k];
+        sum[3] += (double)k * r[k];
+    }
+    state->q[0] = sum[0] + *q;
+    state->p[0] = sum[1] / arc->length;
+    if (state->damper->phase != PHASE_RESTING) {
+        state->damper->r = sum[2] + r[0];
+        state->damper->w = sum[3] / arc->length;
+    }
+    state->base_acceleration = polynomial_value(arc->base, arc->base_degree, 1);
+}
+
 void taylor_step_state(const TaylorStep *arc, ModalState *state, double s) {
     const size_t n = state->padded;
+    if (s == 1 && taylor_step_is_single(state)) {
+        taylor_step_end_single(arc, state);
+        return;
+    }
     double factors[2 * ROW], *const power = factors, *const slope = factors + ROW;
     // By powers rather than Horner's scheme, which adds the small terms first where s is 1.
     taylor_step_powers(arc->degree, s, power, slope);

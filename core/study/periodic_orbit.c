@@ -16,8 +16,8 @@
 
 enum { NEWTON_STEPS = 20, FIRST_TRY = 4, WARM_UP = 8 };
 
-static const double CLOSED = 1e-13; // change by the map of a fixed point
-static const double NEARLY = 1e-10; // where the change no longer falls
+static const double CLOSED = 1e-13; // change by the map at an orbit
+static const double CLOSE = 1e-8;   // a step so small ends at the orbit, but for its square
 static const double RETURNED[] = {1e-3, 1e-2}, MOVED[] = {0.05, 0.3}; // while settling, at its end
 static const double DIFFERENCE = 1e-6;
 static const double STABLE = 1 + 1e-6; // largest multiplier of an orbit that was approached
@@ -157,7 +157,6 @@ static void orbit_search_solve(OrbitSearch *search) {
 
 Status orbit_search_shoot(OrbitSearch *search, CycleFlow *flow, size_t period, bool *is_found,
                           Problem *problem) {
-    double before = INFINITY;
     Status status = STATUS_OK;
     *is_found = false;
     cycle_flow_scales(flow, search->scales);
@@ -167,13 +166,13 @@ Status orbit_search_shoot(OrbitSearch *search, CycleFlow *flow, size_t period, b
         const double change = orbit_search_map(search, flow, period, true, &status);
         if (!(change < FARTHEST))
             break;
-        *is_found = change <= CLOSED || (change <= NEARLY && change >= before / 2);
-        before = change;
-        if (*is_found)
-            break;
         orbit_search_solve(search);
-        for (size_t k = 0; k < search->size; k++)
+        double step = 0;
+        for (size_t k = 0; k < search->size; k++) {
             search->y[k] += search->step[k] * search->scales[k];
+            step = fmax(step, fabs(search->step[k]));
+        }
+        *is_found = change <= CLOSED || step <= CLOSE;
     }
     cycle_flow_restore(flow);
     if (status != STATUS_OK && !orbit_search_is_lost(status, problem))

@@ -155,6 +155,10 @@ static Status curve_check_axis(const StudyAxis *axis, const Simulation *simulati
     return STATUS_OK;
 }
 
+static size_t curve_points(const ResponseStudy *study) {
+    return (size_t)study->axis.count * (study->direction == CURVE_BOTH ? 2 : 1);
+}
+
 static Status curve_complete(void *request, const Simulation *simulation,
                              const SimulationLimits *limits, Problem *problem) {
     const ResponseStudy *study = request;
@@ -172,16 +176,20 @@ static Status curve_complete(void *request, const Simulation *simulation,
                              "number must be at most %d, is %zu; keep fewer modes by "
                              "/accuracy/modes",
                              CURVE_STATE / 2, curve_state_size(simulation) / 2);
-    return study_first_failure(curve_check_axis(&study->axis, simulation, problem), status);
+    TRY(study_first_failure(curve_check_axis(&study->axis, simulation, problem), status));
+    const double rows = (double)curve_points(study) *
+                        (double)(study->section_points + curve_state_size(simulation));
+    if (rows > CURVE_ROWS)
+        return problem_add(problem, STATUS_INVALID, "/study/section_points",
+                           "with the multipliers are %.3g pairs of numbers at all points, at most "
+                           "%d are allowed: ask for fewer of them or fewer points",
+                           rows, CURVE_ROWS);
+    return STATUS_OK;
 }
 
 static void curve_references(void *request, StudyReferences *references) {
     ResponseStudy *study = request;
     *references = (StudyReferences){.names = &study->names}; // the axis has numbers
-}
-
-static size_t curve_points(const ResponseStudy *study) {
-    return (size_t)study->axis.count * (study->direction == CURVE_BOTH ? 2 : 1);
 }
 
 static size_t curve_wander_cycles(const ResponseStudy *study) {

@@ -12,6 +12,7 @@ enum {
     CURVE_PERIOD = 64,    // cycles
     CURVE_SECTION = 4096, // points
     CURVE_STATE = 60,     // numbers in the state
+    CURVE_ROWS = 1 << 20, // pairs of numbers in the answer
 };
 
 typedef enum CurveDirection { CURVE_UP, CURVE_DOWN, CURVE_BOTH } CurveDirection;

@@ -144,6 +144,10 @@ TEST(a_study_that_has_no_cycles_or_no_number_to_vary_is_refused) {
     request = request_make(4);
     axis_set(&request, "/excitation/frequency", 4, 5, 20000);
     assert_refused(&request, "/study/axis/count");
+    request = request_make(4);
+    axis_set(&request, "/excitation/frequency", 4, 5, 10000);
+    study_of(&request)->section_points = 4096;
+    assert_refused(&request, "/study/section_points");
 }
 
 static bool stop_later(void *context, double fraction) {
