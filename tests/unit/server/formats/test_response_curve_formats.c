@@ -18,6 +18,22 @@ static ResponsePoint point_make(uint64_t branch, double value, double peak, bool
     return point;
 }
 
+TEST(a_point_is_a_row_of_the_table) {
+    ResponsePoint points[] = {point_make(1, 3, 0.01, true), point_make(2, 3.1, 0.012, false)};
+    points[1].period = COUNT_ABSENT;
+    points[0].index = 0;
+    points[0].impacts_per_period = 2;
+    const ResponseCurve curve = {.variant = {study_response.answer}, .points = {points, 2}};
+    const StudyFormat *csv = study_format_find(study_formats(study_response.answer), "csv");
+    Bytes bytes = {0};
+    study_format_write(csv, &(StudyDocument){.answer = &curve.variant}, &bytes);
+    assert_false(bytes.is_failed);
+    assert_non_null(strstr(bytes.at, "index,branch,value,direction,period,stable"));
+    assert_non_null(strstr(bytes.at, "0,1,3,up,1,1,2,nan,0.01,"));
+    assert_non_null(strstr(bytes.at, "0.012"));
+    bytes_clear(&bytes);
+}
+
 static char *draw(ResponsePoint *points, size_t count) {
     static char pointer[] = "/excitation/frequency", unit[] = "Hz";
     const ResponseCurve curve = {.pointer = pointer, .unit = unit, .points = {points, count}};
