@@ -11,8 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/json_pointer.h"
 #include "core/excitation/excitation.h"
-#include "core/study/sobol_indices.h"
+#include "core/study/sensitivity.h"
 
 enum {
     RUNS_MAX = 10000,
@@ -204,12 +205,21 @@ static Status ensemble_check_seeds(const EnsembleStudy *study, Problem *problem)
                             text_real(max, 0x1p53 - (double)seeds), seeds);
 }
 
+// Numbers that are drawn for one run.
+static size_t ensemble_numbers(const UncertainInputs *inputs) {
+    size_t count = 0;
+    for (size_t i = 0; i < inputs->count; i++) // a comparison with NAN is false
+        count += inputs->at[i].restitution_deviation > 0 && inputs->at[i].contact_time_deviation > 0
+                     ? 2
+                     : 1;
+    return count;
+}
+
 // What the options of inputs need of each other.
 static Status ensemble_check_inputs(const EnsembleStudy *study, const Simulation *simulation,
                                     Problem *problem) {
     const size_t each = ensemble_sample_runs(study, simulation),
-                 dimensions =
-                     uncertain_inputs_numbers(&study->inputs) * (study->sobol_indices ? 2 : 1);
+                 dimensions = ensemble_numbers(&study->inputs) * (study->sobol_indices ? 2 : 1);
     Status status = STATUS_OK;
     if (!isnan(study->target) && study->sobol_indices)
         status = problem_add(problem, STATUS_INVALID, "/study/target",
@@ -655,10 +665,14 @@ static Status ensemble_begin_inputs(EnsembleWork *work) {
     TRY(ensemble_model(study, &work->base, &work->model));
     for (size_t i = 0; i < work->model.count; i++) {
         const InputNumber *number = &work->model.numbers[i];
+        const char *pointer = uncertain_input_pointer(number->input, 0),
+                   *name =
+                       sensitivity_parameter_names[number->parameter < 0 ? 0 : number->parameter];
         EnsembleInput *input = list_append(&answer->inputs, sizeof *input);
         TRY(status_made(input != NULL));
-        input->is_factor = !isnan(number->deviation);
-        TRY(text_copy(work->model.axes.at[number->member].pointer, &input->pointer));
+        input->is_factor = number->parameter >= 0;
+        TRY(text_copy(input->is_factor ? json_pointer_of(pointer, name).at : pointer,
+                      &input->pointer));
         TRY(text_copy(number->unit, &input->unit));
     }
     if (!study->sobol_indices)

@@ -11,11 +11,9 @@
 #include "core/study/sensitivity.h"
 
 enum {
-    POINTERS_MAX = 16,  // of one input
-    MEMBERS_MAX = 4096, // of all numbers, rows of tables included
-    DRAWS_MAX = 256,    // of one number
-    PROBES = 64,        // of a distribution
-    PROBES_WITHIN = 7,  // of these in range: fewer than a tenth cannot be drawn
+    POINTERS_MAX = 16, // of one input
+    DRAWS_MAX = 64,    // of one number
+    PARAMETERS = 9,    // of all distributions
 };
 
 static const char place_of_all[] = "/study/inputs";
@@ -40,22 +38,17 @@ const Field uncertain_input_fields[] = {
 };
 // clang-format on
 
-// clang-format off
+// Rows of the parameters that each distribution has, from its first.
 static const struct {
-    const char *name;
-    bool is_needed[INPUT_MATERIAL + 1], is_optional; // by InputDistribution
+    const char *first;
+    size_t count;
 } input_parameters[] = {
-    {"mean", {[INPUT_NORMAL] = true}, false},
-    {"deviation", {[INPUT_NORMAL] = true}, false},
-    {"median", {[INPUT_LOGNORMAL] = true}, false},
-    {"log_deviation", {[INPUT_LOGNORMAL] = true}, false},
-    {"from", {[INPUT_UNIFORM] = true, [INPUT_TRIANGULAR] = true}, false},
-    {"mode", {[INPUT_TRIANGULAR] = true}, false},
-    {"to", {[INPUT_UNIFORM] = true, [INPUT_TRIANGULAR] = true}, false},
-    {"restitution_deviation", {[INPUT_MATERIAL] = true}, true},
-    {"contact_time_deviation", {[INPUT_MATERIAL] = true}, true},
+    [INPUT_NORMAL] = {"mean", 2},
+    [INPUT_LOGNORMAL] = {"median", 2},
+    [INPUT_UNIFORM] = {"from", 3}, // without the mode
+    [INPUT_TRIANGULAR] = {"from", 3},
+    [INPUT_MATERIAL] = {"restitution_deviation", 2}, // both are optional
 };
-// clang-format on
 
 static size_t uncertain_input_pointers(const UncertainInput *input) {
     return input->pointer != NULL ? 1 : input->pointers.count;
@@ -74,18 +67,20 @@ static JsonPointer uncertain_input_place(const UncertainInput *input, size_t num
 static Status uncertain_input_check_parameters(const UncertainInput *input, size_t number,
                                                Problem *problem) {
     const JsonPointer own = json_pointer_at(place_of_all, number);
-    const char *name = input_distribution_names[input->distribution];
+    const Field *all = fields_find(uncertain_input_fields, "mean", NULL),
+                *first = fields_find(uncertain_input_fields,
+                                     input_parameters[input->distribution].first, NULL);
     Status status = STATUS_OK;
-    for (size_t i = 0; i < COUNT(input_parameters); i++) {
-        const Field *field = fields_find(uncertain_input_fields, input_parameters[i].name, NULL);
+    for (const Field *field = all; field < all + PARAMETERS; field++) {
         const bool is_given = !field_is_absent(field, input),
-                   is_needed = input_parameters[i].is_needed[input->distribution];
-        if (is_given && !is_needed)
-            status = json_pointer_fault(problem, own.at, input_parameters[i].name,
-                                        "must be left out: distribution %s does not have it", name);
-        if (!is_given && is_needed && !input_parameters[i].is_optional)
-            status = json_pointer_fault(problem, own.at, input_parameters[i].name,
-                                        "is required by distribution %s", name);
+                   is_own = field >= first &&
+                            field < first + input_parameters[input->distribution].count &&
+                            !(input->distribution == INPUT_UNIFORM && field == first + 1);
+        if (is_given != is_own && (is_given || input->distribution != INPUT_MATERIAL))
+            status =
+                json_pointer_fault(problem, own.at, field->name, "%s by distribution %s",
+                                   is_given ? "must be left out: it is not used" : "is required",
+                                   input_distribution_names[input->distribution]);
     }
     if (input->from >= input->to)
         status = json_pointer_fault(problem, own.at, "to", "must be above from, %s",
@@ -115,35 +110,38 @@ static Status uncertain_input_check_overlap(const UncertainInputs *inputs, size_
     return STATUS_OK;
 }
 
-// The buffer that a pointer such as /dampers/0/left_buffer designates; NULL: none.
-static const Buffer *uncertain_input_buffer(const char *pointer, const Simulation *simulation) {
+// The given buffer that a pointer such as /dampers/0/left_buffer designates; NULL: none. Its place
+// is for perturbation_scale.
+static const Buffer *uncertain_input_buffer(const char *pointer, const Simulation *simulation,
+                                            size_t *damper, size_t *place) {
     static const char before[] = "/dampers/";
-    const Dampers *dampers = &simulation->scene.dampers;
+    static const char *const names[] = {"/buffer", "/left_buffer", "/right_buffer"};
+    char *end;
     if (strncmp(pointer, before, sizeof before - 1) != 0)
         return NULL;
-    char *end;
-    const size_t number = strtoul(pointer + sizeof before - 1, &end, 10);
-    if (number >= dampers->count)
-        return NULL;
-    const Damper *damper = &dampers->at[number];
-    const Buffer *buffer = strcmp(end, "/buffer") == 0         ? &damper->buffer
-                           : strcmp(end, "/left_buffer") == 0  ? damper_buffer(damper, SIDE_LEFT)
-                           : strcmp(end, "/right_buffer") == 0 ? damper_buffer(damper, SIDE_RIGHT)
-                                                               : NULL;
-    return buffer != NULL && buffer_is_given(buffer) ? buffer : NULL;
+    *damper = strtoul(pointer + sizeof before - 1, &end, 10);
+    for (*place = 0; *place < COUNT(names); ++*place)
+        if (*damper < simulation->scene.dampers.count && strcmp(end, names[*place]) == 0) {
+            const Buffer *buffer =
+                perturbation_buffer(&simulation->scene.dampers.at[*damper], *place);
+            return buffer_is_given(buffer) ? buffer : NULL;
+        }
+    return NULL;
 }
 
 // Of an input of distribution material.
 static Status uncertain_input_check_buffer(const UncertainInput *input, size_t number, size_t index,
                                            const Simulation *simulation, Problem *problem) {
     const JsonPointer place = uncertain_input_place(input, number, index);
-    const Buffer *buffer =
-                     uncertain_input_buffer(uncertain_input_pointer(input, index), simulation),
-                 *first = uncertain_input_buffer(uncertain_input_pointer(input, 0), simulation);
+    size_t at[2];
+    const Buffer *buffer = uncertain_input_buffer(uncertain_input_pointer(input, index), simulation,
+                                                  &at[0], &at[1]),
+                 *first = uncertain_input_buffer(uncertain_input_pointer(input, 0), simulation,
+                                                 &at[0], &at[1]);
     if (buffer == NULL)
         return problem_add(problem, STATUS_INVALID, place.at,
-                           "must designate a given buffer, as /dampers/0/buffer, for distribution "
-                           "material");
+                           "must designate a given buffer for distribution material: "
+                           "/dampers/0/buffer where both stops have the same");
     if (first != NULL && !text_same(first->material, buffer->material))
         return problem_add(problem, STATUS_INVALID, place.at,
                            "must have the material of the first one: give an input each");
@@ -198,23 +196,22 @@ static Status uncertain_input_check(const UncertainInputs *inputs, size_t number
 // Fills in the recorded deviations of a material; 0: exact, or not a number of this scene.
 static Status uncertain_input_fill(UncertainInput *input, size_t number,
                                    const Simulation *simulation, Problem *problem) {
-    const JsonPointer own = json_pointer_at(place_of_all, number);
-    const Buffer *buffer = uncertain_input_buffer(uncertain_input_pointer(input, 0), simulation);
     static const char *const names[] = {"restitution_deviation", "contact_time_deviation"};
+    const JsonPointer own = json_pointer_at(place_of_all, number);
+    size_t at[2];
+    const Buffer *buffer =
+        uncertain_input_buffer(uncertain_input_pointer(input, 0), simulation, &at[0], &at[1]);
     double *const deviations[] = {&input->restitution_deviation, &input->contact_time_deviation};
     const double recorded[] = {buffer->test.restitution_deviation,
                                buffer->test.contact_time_deviation};
-    for (int parameter = SENSITIVITY_RESTITUTION; parameter <= SENSITIVITY_CONTACT_TIME;
-         parameter++) {
-        double *deviation = deviations[parameter];
-        const char *refused = perturbation_refuse(simulation, parameter);
-        if (*deviation > 0 && refused != NULL)
-            return json_pointer_fault(problem, own.at, names[parameter], "must be left out: %s",
-                                      refused);
-        if (isnan(*deviation))
-            *deviation = recorded[parameter] > 0 && refused == NULL ? recorded[parameter] : 0;
-        if (*deviation > 1)
-            return json_pointer_fault_real(problem, own.at, names[parameter], *deviation, NULL,
+    for (int i = SENSITIVITY_RESTITUTION; i <= SENSITIVITY_CONTACT_TIME; i++) {
+        const char *refused = perturbation_refuse(simulation, i);
+        if (*deviations[i] > 0 && refused != NULL)
+            return json_pointer_fault(problem, own.at, names[i], "must be left out: %s", refused);
+        if (isnan(*deviations[i]))
+            *deviations[i] = recorded[i] > 0 && refused == NULL ? recorded[i] : 0;
+        if (*deviations[i] > 1)
+            return json_pointer_fault_real(problem, own.at, names[i], *deviations[i], NULL,
                                            "is recorded by %.64s and must be at most 1 to be drawn "
                                            "from: give it",
                                            buffer->material);
@@ -248,7 +245,9 @@ static double input_number_value(const InputNumber *number, double u) {
                    ? input->from + sqrt(u * width * (input->mode - input->from))
                    : input->to - sqrt((1 - u) * width * (input->to - input->mode));
     default:
-        return perturbation_factor(input_normal(u), number->deviation);
+        return perturbation_factor(input_normal(u), number->parameter == SENSITIVITY_RESTITUTION
+                                                        ? input->restitution_deviation
+                                                        : input->contact_time_deviation);
     }
 }
 
@@ -256,18 +255,6 @@ static bool input_number_is_within(const InputNumber *number, double value) {
     const Range *range = &number->range;
     return isfinite(value) && value <= range->max &&
            (range->is_open_below ? value > range->min : value >= range->min);
-}
-
-// Whether enough of the distribution is in range; the value nearest to its median that is.
-static bool input_number_probe(const InputNumber *number, double *middle) {
-    size_t within = 0;
-    for (size_t i = 0; i < PROBES; i++) { // outwards from the median
-        const double off = ((double)(i / 2) + 0.5) / PROBES;
-        const double value = input_number_value(number, i % 2 == 0 ? 0.5 - off : 0.5 + off);
-        if (input_number_is_within(number, value) && within++ == 0)
-            *middle = value;
-    }
-    return within >= PROBES_WITHIN;
 }
 
 static void input_number_limit(InputNumber *number, const Range *range) {
@@ -279,86 +266,37 @@ static void input_number_limit(InputNumber *number, const Range *range) {
     own->max = fmin(own->max, range->max);
 }
 
-// Adds "pointer" or "pointer/name" to the members that the last number sets.
-static Status input_model_add(InputModel *model, double base, const char *pointer,
-                              const char *name) {
-    if (model->axes.count == MEMBERS_MAX)
-        return STATUS_LIMIT;
-    StudyAxis *axis = list_grow(&model->axes, sizeof *axis);
-    TRY(status_made(axis != NULL));
-    *axis = (StudyAxis){
-        .from = (double)NAN, .to = (double)NAN, .count = COUNT_ABSENT, .spacing = CHOICE_ABSENT};
-    TRY(study_add_real(base, &model->bases));
-    return text_copy(name != NULL ? json_pointer_of(pointer, name).at : pointer, &axis->pointer);
-}
-
-static InputNumber *input_model_add_number(InputModel *model, const UncertainInputs *inputs,
-                                           size_t index) {
-    InputNumber *number = &model->numbers[model->count++];
-    *number = (InputNumber){.input = &inputs->at[index],
-                            .index = index,
-                            .deviation = (double)NAN,
-                            .range = ANY,
-                            .member = model->axes.count};
-    return number;
-}
-
-// The factor of all e, or of all T_c, of the buffers of one input.
-static Status input_model_add_factor(InputModel *model, const UncertainInputs *inputs, size_t index,
-                                     const Simulation *simulation, int parameter) {
-    const UncertainInput *input = &inputs->at[index];
-    const bool is_restitution = parameter == SENSITIVITY_RESTITUTION;
-    const char *name = sensitivity_parameter_names[parameter];
-    InputNumber *number = input_model_add_number(model, inputs, index);
-    double max = 0;
-    number->deviation =
-        is_restitution ? input->restitution_deviation : input->contact_time_deviation;
-    for (size_t i = 0; i < uncertain_input_pointers(input); i++) {
-        const char *pointer = uncertain_input_pointer(input, i);
-        const Buffer *buffer = uncertain_input_buffer(pointer, simulation);
-        const double own = is_restitution ? buffer->restitution : buffer->contact_time;
-        if (!isnan(own))
-            TRY(input_model_add(model, own, pointer, name));
-        max = fmax(max, own);
-        for (size_t k = 0; k < buffer->table.count; k++) {
-            const ContactRow *row = &buffer->table.at[k];
-            const double value = is_restitution ? row->restitution : row->contact_time;
-            const JsonPointer rows = json_pointer_of(pointer, "table");
-            if (!isnan(value))
-                TRY(input_model_add(model, value, json_pointer_at(rows.at, k).at, name));
-            max = fmax(max, value);
-        }
-    }
-    number->range = (Range){0, is_restitution && max > 0 ? 1 / max : (double)INFINITY, true};
-    return STATUS_OK;
-}
-
-static Status input_model_add_value(InputModel *model, const UncertainInputs *inputs, size_t index,
-                                    const Simulation *simulation) {
-    const UncertainInput *input = &inputs->at[index];
-    InputNumber *number = input_model_add_number(model, inputs, index);
-    for (size_t i = 0; i < uncertain_input_pointers(input); i++) {
-        const char *pointer = uncertain_input_pointer(input, i);
+static void input_model_add_value(InputModel *model, InputNumber *number,
+                                  const Simulation *simulation) {
+    const UncertainInput *input = number->input;
+    for (size_t i = uncertain_input_pointers(input); i-- > 0;) {
         char why[JSON_POINTER_MESSAGE_MAX];
         bool is_tag;
-        const Field *field =
-            json_pointer_find(simulation_fields, simulation, pointer, &is_tag, why);
-        if (i == 0)
-            number->unit = field->unit;
+        const Field *field = json_pointer_find(simulation_fields, simulation,
+                                               uncertain_input_pointer(input, i), &is_tag, why);
+        number->unit = field->unit;
         input_number_limit(number, &field->range);
-        TRY(input_model_add(model, (double)NAN, pointer, NULL));
     }
-    return STATUS_OK;
+    model->axes[model->axis_count++] = (StudyAxis){.pointer = input->pointer,
+                                                   .pointers = input->pointers,
+                                                   .from = (double)NAN,
+                                                   .to = (double)NAN,
+                                                   .count = COUNT_ABSENT,
+                                                   .spacing = CHOICE_ABSENT};
 }
 
-size_t uncertain_inputs_numbers(const UncertainInputs *inputs) {
-    size_t count = 0;
-    for (size_t i = 0; i < inputs->count; i++)
-        count += inputs->at[i].distribution != INPUT_MATERIAL
-                     ? 1
-                     : (size_t)(inputs->at[i].restitution_deviation > 0) +
-                           (size_t)(inputs->at[i].contact_time_deviation > 0);
-    return count;
+// No restitution of its buffers may exceed 1.
+static void input_number_limit_factor(InputNumber *number, const Simulation *simulation) {
+    number->range.min = 0;
+    for (size_t i = 0; i < uncertain_input_pointers(number->input); i++) {
+        size_t damper, place;
+        (void)uncertain_input_buffer(uncertain_input_pointer(number->input, i), simulation, &damper,
+                                     &place);
+        const double max = perturbation_buffer_max(&simulation->scene.dampers.at[damper], place,
+                                                   number->parameter);
+        if (number->parameter == SENSITIVITY_RESTITUTION && max > 0)
+            number->range.max = fmin(number->range.max, 1 / max);
+    }
 }
 
 Status input_model_make(const UncertainInputs *inputs, const Simulation *simulation, int method,
@@ -366,23 +304,24 @@ Status input_model_make(const UncertainInputs *inputs, const Simulation *simulat
     *model = (InputModel){.count = 0};
     for (size_t i = 0; i < inputs->count; i++) {
         const UncertainInput *input = &inputs->at[i];
-        if (input->distribution != INPUT_MATERIAL)
-            TRY(input_model_add_value(model, inputs, i, simulation));
-        if (input->restitution_deviation > 0)
-            TRY(input_model_add_factor(model, inputs, i, simulation, SENSITIVITY_RESTITUTION));
-        if (input->contact_time_deviation > 0)
-            TRY(input_model_add_factor(model, inputs, i, simulation, SENSITIVITY_CONTACT_TIME));
+        const double deviations[] = {input->restitution_deviation, input->contact_time_deviation};
+        for (int parameter = -1; parameter <= SENSITIVITY_CONTACT_TIME; parameter++) {
+            if (parameter < 0 ? input->distribution == INPUT_MATERIAL
+                              : !(deviations[parameter] > 0))
+                continue;
+            InputNumber *number = &model->numbers[model->count++];
+            *number = (InputNumber){input, i, parameter, ANY, NULL};
+            if (parameter < 0)
+                input_model_add_value(model, number, simulation);
+            else
+                input_number_limit_factor(number, simulation);
+        }
     }
     return sampling_make(method, seed, rows, tables * model->count, &model->sampling);
 }
 
 void input_model_clear(InputModel *model) {
-    for (size_t i = 0; i < model->axes.count; i++)
-        free(model->axes.at[i].pointer);
-    free(model->axes.at);
-    free(model->bases.at);
     sampling_clear(&model->sampling);
-    *model = (InputModel){.count = 0};
 }
 
 Status input_model_draw(const InputModel *model, size_t number, size_t row, size_t table,
@@ -396,54 +335,60 @@ Status input_model_draw(const InputModel *model, size_t number, size_t row, size
         ++*again;
         *value = input_number_value(of, sampling_draw_again(&model->sampling, row, dimension, i));
     }
-    return problem_add(problem, STATUS_INVALID, model->axes.at[of->member].pointer,
+    return problem_add(problem, STATUS_INVALID, uncertain_input_pointer(of->input, 0),
                        "is out of its range in all of %d draws", (int)DRAWS_MAX);
+}
+
+// Factors are those of the base's numbers, values are set after them.
+static void input_model_scale(const InputModel *model, const double *values, const Simulation *base,
+                              Simulation *copy) {
+    for (size_t i = 0; i < model->count; i++) {
+        const InputNumber *number = &model->numbers[i];
+        for (size_t k = 0; k < uncertain_input_pointers(number->input); k++) {
+            size_t damper, place;
+            if (number->parameter >= 0 &&
+                uncertain_input_buffer(uncertain_input_pointer(number->input, k), base, &damper,
+                                       &place) != NULL)
+                perturbation_scale(&base->scene.dampers.at[damper], place, number->parameter,
+                                   values[i], &copy->scene.dampers.at[damper]);
+        }
+    }
 }
 
 Status input_model_scene(const InputModel *model, const double *values, const Simulation *base,
                          const SimulationLimits *limits, Simulation *target, Problem *problem) {
+    StudyValue set[INPUTS_MAX];
+    size_t count = 0;
+    Simulation copy;
     *target = (Simulation){0};
-    StudyValue *all = calloc(model->axes.count + 1, sizeof *all);
-    if (all == NULL)
+    if (fields_copy(simulation_fields, base, &copy) != STATUS_OK)
         return study_result(STATUS_NO_MEMORY, problem);
-    for (size_t i = 0; i < model->count; i++) {
-        const size_t end = i + 1 < model->count ? model->numbers[i + 1].member : model->axes.count;
-        for (size_t k = model->numbers[i].member; k < end; k++)
-            all[k].number = isnan(model->bases.at[k]) ? values[i] : model->bases.at[k] * values[i];
-    }
-    const Status status =
-        study_scene_make(base, &model->axes, all, NULL, false, limits, target, problem);
-    free(all);
+    input_model_scale(model, values, base, &copy);
+    for (size_t i = 0; i < model->count; i++)
+        if (model->numbers[i].parameter < 0)
+            set[count++] = (StudyValue){NULL, values[i]};
+    const StudyAxes axes = {(StudyAxis *)model->axes, count};
+    const Status status = study_scene_make(&copy, &axes, set, NULL, false, limits, target, problem);
+    simulation_clear(&copy);
     return status;
 }
 
-// Each distribution must have its range, and their middle must be a scene.
-static Status uncertain_inputs_probe(const InputModel *model, const Simulation *simulation,
-                                     const SimulationLimits *limits, Problem *problem) {
-    Status status = STATUS_OK;
+// The medians of all inputs must be a scene.
+static Status uncertain_inputs_check_medians(const InputModel *model, const Simulation *simulation,
+                                             const SimulationLimits *limits, Problem *problem) {
     double values[INPUT_NUMBERS_MAX];
-    for (size_t i = 0; i < model->count; i++) {
-        const InputNumber *number = &model->numbers[i];
-        const JsonPointer own = json_pointer_at(place_of_all, number->index);
-        if (!input_number_probe(number, &values[i]))
-            status = json_pointer_fault(
-                problem, own.at, "distribution",
-                "has too few values within the range of %s, %s %s to %s, to be drawn: at least a "
-                "tenth must be",
-                model->axes.at[number->member].pointer, number->range.is_open_below ? "above" : "",
-                real_text(number->range.min).at, real_text(number->range.max).at);
-    }
-    TRY(status);
     Problem own;
     Simulation scene;
     problem_clear(&own);
-    status = input_model_scene(model, values, simulation, limits, &scene, &own);
+    for (size_t i = 0; i < model->count; i++)
+        values[i] = input_number_value(&model->numbers[i], 0.5 - 0x1p-50);
+    const Status status = input_model_scene(model, values, simulation, limits, &scene, &own);
     simulation_clear(&scene);
-    if (status != STATUS_INVALID)
-        return status == STATUS_OK ? status : problem_add(problem, status, "", "%s", own.detail);
-    return problem_add(problem, status, place_of_all,
-                       "give no valid scene at the middle of their ranges: %.80s %.200s",
-                       own.faults[0].pointer, own.faults[0].detail);
+    return status != STATUS_INVALID ? status
+                                    : problem_add(problem, status, place_of_all,
+                                                  "have medians that give no valid scene: %.80s "
+                                                  "%.200s",
+                                                  own.faults[0].pointer, own.faults[0].detail);
 }
 
 Status uncertain_inputs_complete(UncertainInputs *inputs, const Simulation *simulation,
@@ -460,11 +405,7 @@ Status uncertain_inputs_complete(UncertainInputs *inputs, const Simulation *simu
     InputModel model;
     status = input_model_make(inputs, simulation, SAMPLING_RANDOM, 1, 1, 1, &model);
     if (status == STATUS_OK)
-        status = uncertain_inputs_probe(&model, simulation, limits, problem);
+        status = uncertain_inputs_check_medians(&model, simulation, limits, problem);
     input_model_clear(&model);
-    return status != STATUS_LIMIT
-               ? status
-               : problem_add(problem, STATUS_INVALID, place_of_all,
-                             "set more than %d numbers: name fewer buffers with tables",
-                             (int)MEMBERS_MAX);
+    return status;
 }

@@ -44,31 +44,26 @@ const char *uncertain_input_pointer(const UncertainInput *input, size_t index); 
 Status uncertain_inputs_complete(UncertainInputs *inputs, const Simulation *simulation,
                                  const SimulationLimits *limits, Problem *problem);
 
-// Numbers that are drawn for one run of completed inputs.
-size_t uncertain_inputs_numbers(const UncertainInputs *inputs);
-
 // A number that is drawn: the value of an input, or a factor of a buffer's e or T_c.
 typedef struct InputNumber {
     const UncertainInput *input;
     size_t index;     // of the input
-    double deviation; // of a factor; NAN: the number is a value
+    int parameter;    // of a factor: SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME; else -1
     Range range;      // numbers outside are drawn again
     const char *unit; // NULL: none
-    size_t member;    // the first that it sets, among the axes of the model
 } InputNumber;
 
 // Completed inputs with their points. Immutable, shared by threads.
 typedef struct InputModel {
     InputNumber numbers[INPUT_NUMBERS_MAX];
     size_t count;
-    StudyAxes axes; // the members of each number in turn; their pointers are owned
-    Reals bases;    // of each axis: what the factor multiplies; NAN: the number is the value
+    StudyAxis axes[INPUTS_MAX]; // of the values; what they own is the inputs'
+    size_t axis_count;
     Sampling sampling;
 } InputModel;
 
 // `tables` independent points per row: dimension d of table t is d + t * count. Borrows `inputs`.
-// Cleared by input_model_clear in any case. STATUS_NO_MEMORY, or STATUS_LIMIT for a model that
-// uncertain_inputs_complete refuses.
+// Cleared by input_model_clear in any case. STATUS_NO_MEMORY.
 Status input_model_make(const UncertainInputs *inputs, const Simulation *simulation, int method,
                         uint64_t seed, size_t rows, size_t tables, InputModel *model);
 void input_model_clear(InputModel *model);

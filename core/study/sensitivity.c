@@ -22,7 +22,7 @@ enum { BUFFERS = 3, DRAWS_MAX = 64, STREAM = 0x53454e53 };
 const char *const sensitivity_parameter_names[] = {
     "restitution", "contact_time", "stiffness", "damping", "mass", "clearance", NULL};
 
-static Buffer *perturbation_buffer(const Damper *damper, size_t index) {
+Buffer *perturbation_buffer(const Damper *damper, size_t index) {
     static const size_t offsets[BUFFERS] = {offsetof(Damper, buffer), offsetof(Damper, left_buffer),
                                             offsetof(Damper, right_buffer)};
     return (Buffer *)(void *)((char *)damper + offsets[index]);
@@ -50,8 +50,7 @@ static double *perturbation_number(const Damper *damper, size_t buffer, int para
     return parameter == SENSITIVITY_RESTITUTION ? &row->restitution : &row->contact_time;
 }
 
-// The largest of them; NAN: none.
-static double perturbation_buffer_max(const Damper *damper, size_t buffer, int parameter) {
+double perturbation_buffer_max(const Damper *damper, size_t buffer, int parameter) {
     double max = (double)NAN;
     const double *number;
     for (size_t i = 0; (number = perturbation_number(damper, buffer, parameter, i)) != NULL; i++)
@@ -91,8 +90,8 @@ double perturbation_max_step(const Simulation *simulation, int parameter, double
                : step;
 }
 
-static void perturbation_scale(const Damper *from, size_t buffer, int parameter, double factor,
-                               Damper *to) {
+void perturbation_scale(const Damper *from, size_t buffer, int parameter, double factor,
+                        Damper *to) {
     const double max = parameter == SENSITIVITY_RESTITUTION ? 1 : (double)INFINITY;
     const double *number;
     for (size_t i = 0; (number = perturbation_number(from, buffer, parameter, i)) != NULL; i++)

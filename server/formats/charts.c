@@ -314,8 +314,9 @@ void chart_ensemble(const Variant *answer, Bytes *bytes) {
     for (size_t i = 0; i < ensemble->table.count; i++)
         runs += ensemble->table.at[i].why == NULL ? 1 : 0;
     chart.title = chart_text(&chart, "Mean of %llu runs", runs);
-    chart.heading = chart_text(&chart, "Mean of %llu runs, with its %g %% interval", runs,
-                               100 * ensemble->confidence);
+    chart.heading = has_inputs ? chart_text(&chart, "Median of %llu runs, with 90 %% of them", runs)
+                               : chart_text(&chart, "Mean of %llu runs, with its %g %% interval",
+                                            runs, 100 * ensemble->confidence);
     bytes_format(&chart.description, "%llu runs of %llu, seeds from %llu; %llu failed.",
                  (unsigned long long)ensemble->made, (unsigned long long)ensemble->runs,
                  (unsigned long long)ensemble->first_seed, (unsigned long long)ensemble->failed);

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 
 #include "core/study/ensemble.h"
-#include "core/study/sobol_indices.h"
 #include "tests/support/scenes.h"
 #include "tests/support/test.h"
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "core/study/sampling.h"
-#include "core/study/sobol_indices.h"
+#include "core/study/statistics.h"
 #include "tests/support/test.h"
 
 #define PI 3.14159265358979323846
