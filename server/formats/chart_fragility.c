@@ -47,7 +47,7 @@ static void fragility_add_limit(Chart *chart, ChartPanel *panel, const Fragility
         names[l] = chart_text(chart, "%.3g of the records at %g m/s^2", shares[l], levels[l]);
     }
     for (size_t i = 0; i < POINTS && !chart->is_failed; i++) {
-        x[i] = levels[count - 1] * (double)i / (POINTS - 1);
+        x[i] = levels[0] + (levels[count - 1] - levels[0]) * (double)i / (POINTS - 1);
         y[i] = erfc(-log(x[i] / limit->median) / limit->dispersion / sqrt(2)) / 2;
     }
     chart_add(panel, (ChartSeries){.kind = CHART_MARKERS,

@@ -4,6 +4,7 @@
 // all in turn, medians.
 //
 //     bench_sweep [points [threads [rounds]]]
+#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,6 +14,7 @@
 
 #include "core/math/fft.h"
 #include "core/study/sweep.h"
+#include "server/db/records.h"
 #include "server/jobs/jobs.h"
 #include "server/jobs/sweep.h"
 #include "server/util/clock.h"
@@ -21,24 +23,70 @@ enum { ROUNDS_MAX = 64 };
 
 static size_t points = 10000, threads = 2, rounds = 5;
 
-static void scene_text(char target[1024], size_t count, double mass, bool is_ensemble) {
-    char study[400];
-    snprintf(study, sizeof study,
-             is_ensemble ? "{\"kind\": \"ensemble\", \"runs\": %zu, \"inputs\": [{\"pointer\": "
-                           "\"/dampers/0/clearance\", \"distribution\": \"uniform\", \"from\": "
-                           "0.01, \"to\": 0.03}]}"
-                         : "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
-                           "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.03, \"count\": "
-                           "%zu}]}",
-             count);
-    snprintf(target, 1024,
+typedef enum BenchStudy { BENCH_SWEEP, BENCH_ENSEMBLE, BENCH_SHAKEN, BENCH_FRAGILITY } BenchStudy;
+
+enum { RECORDS = 10, RECORD_SAMPLES_MADE = 500 };
+#define RECORD_NAMES "[\"r0\",\"r1\",\"r2\",\"r3\",\"r4\",\"r5\",\"r6\",\"r7\",\"r8\",\"r9\"]"
+
+// Of BENCH_SHAKEN and BENCH_FRAGILITY the runs are the same: records at levels, by a sweep of the
+// factor and by a fragility.
+static void study_text(char target[600], size_t count, BenchStudy study) {
+    static const char *const formats[] = {
+        [BENCH_SWEEP] = "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/dampers/0/clearance\", "
+                        "\"from\": 0.01, \"to\": 0.03, \"count\": %zu}]}",
+        [BENCH_ENSEMBLE] =
+            "{\"kind\": \"ensemble\", \"runs\": %zu, \"inputs\": [{\"pointer\": "
+            "\"/dampers/0/clearance\", \"distribution\": \"uniform\", \"from\": 0.01, \"to\": "
+            "0.03}]}",
+        [BENCH_SHAKEN] = "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/name\", "
+                         "\"values\": " RECORD_NAMES "}, {\"pointer\": \"/excitation/scale\", "
+                         "\"from\": 0.1, \"to\": 3, \"count\": %zu}]}",
+        [BENCH_FRAGILITY] =
+            "{\"kind\": \"fragility\", \"records\": " RECORD_NAMES ", \"levels\": {\"from\": "
+            "0.1, \"to\": 3, \"count\": %zu}, \"limits\": [{\"metric\": \"peak_displacement\", "
+            "\"value\": 0.01}]}",
+    };
+    snprintf(target, 600, formats[study], study >= BENCH_SHAKEN ? count / RECORDS : count);
+}
+
+static void scene_text(char target[1600], size_t count, double mass, BenchStudy study) {
+    char text[600];
+    study_text(text, count, study);
+    snprintf(target, 1600,
              "{\"structure\": {\"mass\": %.17g, \"stiffness\": 865, \"damping\": 1.092},"
              " \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],"
-             " \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015},"
+             " \"excitation\": {\"kind\": %s},"
              " \"duration\": 10, \"sample_rate\": 1000,"
              " \"output\": {\"channels\": [], \"psd\": null, \"impacts\": false},"
              " \"study\": %s}",
-             mass, study);
+             mass,
+             study >= BENCH_SHAKEN ? "\"record\", \"name\": \"r0\""
+                                   : "\"free\", \"displacement\": 0.015",
+             text);
+}
+
+// Ground motions of 10 s with a peak of 1 m/s^2.
+static Status add_records(Db *db, Problem *problem) {
+    double values[RECORD_SAMPLES_MADE];
+    for (size_t r = 0; r < RECORDS; r++) {
+        char name[8], digest[RECORD_DIGEST_SIZE];
+        bool is_there;
+        for (size_t i = 0; i < RECORD_SAMPLES_MADE; i++)
+            values[i] = sin(0.02 * (double)i * (6 + (double)r)) * sin(3.14159 * (double)i / 500);
+        values[250] = 1;
+        const Reals samples = {values, RECORD_SAMPLES_MADE};
+        snprintf(name, sizeof name, "r%zu", r);
+        record_digest(0.02, &samples, digest);
+        const RecordRow row = {.name = name,
+                               .layout = "json",
+                               .unit = "m/s^2",
+                               .interval = 0.02,
+                               .count = RECORD_SAMPLES_MADE,
+                               .peak = 1,
+                               .digest = digest};
+        TRY(db_record_add(db, &row, &samples, &is_there, problem));
+    }
+    return STATUS_OK;
 }
 
 static int fail(const char *what, const Problem *problem) {
@@ -86,10 +134,10 @@ static double time_core(const Simulation *scenes) {
 }
 
 // A new study each time: the structure's mass is another.
-static double time_room(JobManager *manager, size_t round, bool is_ensemble, Problem *problem) {
-    char text[1024];
+static double time_room(JobManager *manager, size_t round, BenchStudy study, Problem *problem) {
+    char text[1600];
     Job *job;
-    scene_text(text, points, 1.35 + 1e-9 * (double)round, is_ensemble);
+    scene_text(text, points, 1.35 + 1e-9 * (double)round, study);
     const Submission submission = {.text = text, .size = strlen(text)};
     const int64_t began_ns = clock_monotonic_ns();
     if (jobs_submit(manager, &submission, &job, problem) != STATUS_OK)
@@ -112,12 +160,12 @@ static double median(double *values, size_t count) {
 }
 
 static int bench_judging(Db *db, Problem *problem) {
-    char text[1024];
+    char text[1600];
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     SweepGrid *plan;
     const SimulationLimits limits = {.samples = 1 << 25, .points = 1 << 20};
-    scene_text(text, 100000, 1.35, false);
+    scene_text(text, 100000, 1.35, BENCH_SWEEP);
     int64_t began_ns = clock_monotonic_ns();
     if (jobs_prepare(db, text, strlen(text), &limits, &inquiry, &warnings, problem) != STATUS_OK)
         return fail("judging", problem);
@@ -161,7 +209,7 @@ static int bench_rows(Db *db, Problem *problem) {
 
 int main(int argc, char **argv) {
     static Problem problem;
-    char folder[] = "/tmp/impactd-bench-XXXXXX", text[1024];
+    char folder[] = "/tmp/impactd-bench-XXXXXX", text[1600];
     if (argc > 1)
         points = strtoul(argv[1], NULL, 10);
     if (argc > 2)
@@ -178,13 +226,13 @@ int main(int argc, char **argv) {
                                          .cache_bytes = 1 << 24,
                                          .limits = {.samples = 1 << 25, .points = 1 << 24}};
     fft_start();
-    if (db_open(folder, &db, &problem) != STATUS_OK ||
+    if (db_open(folder, &db, &problem) != STATUS_OK || add_records(db, &problem) != STATUS_OK ||
         jobs_open(db, &settings, &manager, &problem) != STATUS_OK)
         return fail("opening", &problem);
     StudyRequest inquiry = {0};
     Warnings warnings = {NULL, 0};
     SweepGrid *plan;
-    scene_text(text, points, 1.35, false);
+    scene_text(text, points, 1.35, BENCH_SWEEP);
     if (jobs_prepare(db, text, strlen(text), NULL, &inquiry, &warnings, &problem) != STATUS_OK ||
         sweep_grid_new((const SweepStudy *)(const void *)inquiry.study, &inquiry.simulation, NULL,
                        &plan, &problem) != STATUS_OK)
@@ -198,18 +246,23 @@ int main(int argc, char **argv) {
     double core[ROUNDS_MAX], room[ROUNDS_MAX], ratio[ROUNDS_MAX];
     double core_cpu[ROUNDS_MAX], room_cpu[ROUNDS_MAX], draws[ROUNDS_MAX], draws_ratio[ROUNDS_MAX],
         draws_cpu[ROUNDS_MAX];
+    double shaken[ROUNDS_MAX], fragility[ROUNDS_MAX], fragility_ratio[ROUNDS_MAX];
+    const bool has_records = points <= 10000 && points >= 2 * RECORDS;
     for (size_t i = 0; i < rounds; i++) {
         double began = process_cpu();
         core[i] = time_core(scenes);
         core_cpu[i] = process_cpu() - began;
         began = process_cpu();
-        room[i] = time_room(manager, i + 1, false, &problem);
+        room[i] = time_room(manager, i + 1, BENCH_SWEEP, &problem);
         room_cpu[i] = process_cpu() - began;
         began = process_cpu();
-        draws[i] = points <= 10000 ? time_room(manager, i + 1, true, &problem) : 0;
+        draws[i] = points <= 10000 ? time_room(manager, i + 1, BENCH_ENSEMBLE, &problem) : 0;
         draws_cpu[i] = process_cpu() - began;
         draws_ratio[i] = room[i] / draws[i];
-        if (room[i] < 0 || draws[i] < 0)
+        shaken[i] = has_records ? time_room(manager, i + 1, BENCH_SHAKEN, &problem) : 0;
+        fragility[i] = has_records ? time_room(manager, i + 1, BENCH_FRAGILITY, &problem) : 0;
+        fragility_ratio[i] = shaken[i] / fragility[i];
+        if (room[i] < 0 || draws[i] < 0 || shaken[i] < 0 || fragility[i] < 0)
             return fail("submitting", &problem);
         ratio[i] = core[i] / room[i];
     }
@@ -221,6 +274,11 @@ int main(int argc, char **argv) {
     if (points <= 10000)
         printf("ensemble of uncertain inputs: %.0f runs/s\nensemble / sweep: %.2f\n",
                (double)points / median(draws, rounds), median(draws_ratio, rounds));
+    if (has_records)
+        printf("fragility: %.0f runs/s, sweep of the same runs: %.0f points/s\nfragility / sweep: "
+               "%.2f\n",
+               (double)points / median(fragility, rounds), (double)points / median(shaken, rounds),
+               median(fragility_ratio, rounds));
     printf("CPU a point: core %.1f us, sweep %.1f us, ensemble %.1f us\n",
            micro * median(core_cpu, rounds), micro * median(room_cpu, rounds),
            micro * median(draws_cpu, rounds));
