@@ -120,6 +120,40 @@ TEST_IN(null_empties_what_allows_it, set_up, tear_down) {
     assert_int_equal(whole.extra.rule, CHOICE_ABSENT);
 }
 
+typedef struct Steps {
+    Reals values;
+    double from;
+} Steps;
+typedef struct Stairs {
+    Steps steps;
+} Stairs;
+
+TEST(a_list_of_numbers_may_stand_for_an_item) {
+    static const Field steps_fields[] = {
+        FIELD_REALS(Steps, values, "m", ANY, 3, PRESENCE_OPTIONAL, "heights"),
+        FIELD_REAL(Steps, from, "m", ANY, OPTIONAL, "the first"), FIELD_END};
+    static const Field stairs_fields[] = {
+        FIELD_ITEM(Stairs, steps, steps_fields, "values", PRESENCE_REQUIRED, "steps"), FIELD_END};
+    static const struct {
+        const char *text, *fault;
+    } cases[] = {{"{\"steps\": [1, 2]}", NULL},
+                 {"{\"steps\": {\"values\": [1, 2]}}", NULL},
+                 {"{\"steps\": {\"from\": 1}}", NULL},
+                 {"{\"steps\": 1}", "must be an object or an array of numbers, is a number"},
+                 {"{\"steps\": [1, 2, 3, 4]}", "must have at most 3 numbers, has 4"}};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        Stairs stairs;
+        problem_clear(&problem);
+        const Status status =
+            json_parse(cases[i].text, strlen(cases[i].text), stairs_fields, &stairs, &problem);
+        assert_int_equal(status, cases[i].fault == NULL ? STATUS_OK : STATUS_INVALID);
+        assert_int_equal(stairs.steps.values.count, i < 2 ? 2 : 0);
+        if (cases[i].fault != NULL)
+            assert_string_equal(problem.faults[0].detail, cases[i].fault);
+        fields_clear(stairs_fields, &stairs);
+    }
+}
+
 TEST_IN(labels_may_be_pairs, set_up, tear_down) {
     assert_int_equal(read("{\"labels\": {\"project\": \"rig\", \"x\": \"\"}}"), STATUS_OK);
     assert_int_equal(whole.labels.count, 2);
