@@ -28,13 +28,15 @@
 
 enum {
     VARIABLES = CALIBRATE_PARAMETERS + 1, // and the shift
-    SCREENED = 16,                        // points for each start
-    WINDOWS = 4,                          // of the record, each twice as long as the one before
+    SCREENED_FIRST = 32,                  // points for each start in the first window
+    SCREENED = 16,                        // and in later ones
+    WINDOWS = 7,                          // of the record, each longer than the one before
     SAMPLES_MIN = 16,
     SPECTRUM_SAMPLES_MIN = 64,
     STEPS_FIRST = 15, // of a start in a window, tried
     STEPS_LAST = 60,
     REPEATS = 3, // of the last window, with new estimates of the noise
+    RETRIES = 3, // of a window that fits worse than the one before
     KEPT_MIN = 3,
     REFINEMENTS = 3, // of differences
     EXPLORED = 96,   // points around the best fit
@@ -47,10 +49,12 @@ enum {
 };
 
 static const double confidence = 0.95;
-static const double sensitive = 6; // growth of the effect of a parameter from window to window
+static const double window_growth = 1.4142; // of the length of windows
+static const double sensitive = 2.5,
+                    rough = 4; // growth of the effect of a parameter from window to window
 static const double difference_share = 0.5; // of the deviation of one parameter alone
 static const double difference_first = 1e-5, difference_min = 1e-9, difference_max = 1e-4,
-                    difference_chaos = 2e-2;
+                    difference_chaos = 5e-2;
 static const double difference_change = 3; // factor above which derivatives are made again
 static const double one_sided = 4;         // ratio of squares
 static const double damping_first = 1e-3, damping_max = 1e12;
@@ -59,11 +63,11 @@ static const double tolerance_first = 1e-2, tolerance_last = 1e-4;
 static const double scatter = 2, scatter_max = 0.5; // standard errors; of the range
 static const double same_point = 1e-3;              // starts this close are one
 static const double hopeless = 10;                  // times the least cost: dropped after a window
-static const double growth_max = 1e-9;     // error of rounding above which no window is longer
 static const double predictable = 1 / 3.0; // of the trust horizon: errors have grown 2000 times
-static const double undetermined = 0.5;    // half width of an interval, of the range
-static const double rival = 0.15;          // of the range: a valley this far away that fits as well
-static const double structured = 0.05;     // of the motion: rms of residuals that is not explained
+static const double enough = 0.2; // half width of an interval of the window before, of the range
+static const double undetermined = 0.5; // half width of an interval, of the range
+static const double rival = 0.25;       // of the range: a valley this far away that fits as well
+static const double structured = 0.05;  // of the motion: rms of residuals that is not explained
 static const double quantile_95 = 1.645, quantile_999 = 3.09; // one-sided, normal
 static const double spectrum_misfit = 3;                      // of the expected rms
 // Sum of the squared correlations of neighbouring frequencies, for Hann's window.
@@ -461,6 +465,7 @@ typedef struct CalibrateWork {
     double ends[WINDOWS];
     size_t windows, window, repeats;
     bool is_limited; // the record is longer than can be predicted
+    bool is_beyond;  // because of its trust horizon
     bool is_chaotic; // and spectra are fitted therefore
     double horizon;  // where the fit ends then [s]
     Simulation base; // of the window
@@ -475,7 +480,7 @@ typedef struct CalibrateWork {
     double norms[VARIABLES];    // their squares
     size_t refinements;
     uint64_t draws;
-    size_t explorations;
+    size_t explorations, retries;
     CalibrateResult results[WINDOWS];
     CalibratePoints points; // of the window
     CalibrateAssessment assessment;
@@ -803,6 +808,18 @@ static double calibrate_sum_squares(const double *values, size_t count) {
     return sum;
 }
 
+// Spectra of motions that cannot be predicted differ from run to run as from the measured one. What
+// that adds to the squares of the derivatives is removed from them.
+static void calibrate_remove_noise(const CalibrateWork *work, CalibrateStart *start) {
+    const size_t n = work->variables;
+    for (size_t i = 0; i < work->parameters; i++) {
+        const double step = start->differences[i], sides = work->stage == STAGE_FIT ? 1 : 2;
+        const double noise = 2 * start->cost / (step * step * sides * sides);
+        double *square = &start->equations.matrix[i * (n + 1)];
+        *square = fmax(*square - noise, 1e-3 * noise);
+    }
+}
+
 // Of the best point each column is made twice, on both sides. A difference is much larger than that
 // of the other side where an impact begins or ends within it: then the smaller one is used.
 static void calibrate_fold_column(CalibrateWork *work, CalibrateStart *start,
@@ -829,6 +846,8 @@ static void calibrate_fold_column(CalibrateWork *work, CalibrateStart *start,
     for (size_t i = 0; i < work->variables; i++)
         columns[i] = i < work->parameters ? work->columns[i] : start->slope;
     normal_equations_make(columns, work->variables, start->residual, work->rows, &start->equations);
+    if (work->is_chaotic)
+        calibrate_remove_noise(work, start);
     const double change = calibrate_set_differences(work, start);
     if (work->stage == STAGE_FIT)
         calibrate_plan_step(work, start);
@@ -939,25 +958,6 @@ static void calibrate_thin_starts(CalibrateWork *work) {
     work->start_count = kept;
 }
 
-// Whether errors grow too fast for a longer window; the part that can be predicted then becomes
-// the last window.
-static bool calibrate_limit(CalibrateWork *work) {
-    const CalibrateStart *best = calibrate_best(work);
-    const double end = work->ends[work->window];
-    if (best == NULL || work->fit == CALIBRATE_PSD || work->is_limited)
-        return false;
-    if (isnan(best->horizon) && !(best->error > growth_max))
-        return false;
-    work->is_limited = true;
-    const double limit = isnan(best->horizon) ? end / 2 : best->horizon * predictable;
-    work->horizon = fmin(limit, end);
-    work->windows = work->window + 1;
-    work->ends[work->window] = work->horizon;
-    for (size_t i = 0; i < work->start_count; i++)
-        memcpy(work->starts[i].at, work->starts[i].before, sizeof work->starts[i].at);
-    return true;
-}
-
 // Keeps the result of the window.
 static void calibrate_save(CalibrateWork *work) {
     CalibrateResult *result = &work->results[work->window];
@@ -971,7 +971,7 @@ static void calibrate_save(CalibrateWork *work) {
 
 // Whether the window before is a result on its own, and this one is so much more sensitive that
 // its valleys may have been missed.
-static bool calibrate_may_return(const CalibrateWork *work) {
+static bool calibrate_may_return(const CalibrateWork *work, double limit) {
     if (work->window == 0 || work->fit == CALIBRATE_PSD)
         return false;
     const CalibrateResult *before = &work->results[work->window - 1];
@@ -981,12 +981,12 @@ static bool calibrate_may_return(const CalibrateWork *work) {
     double covariance[VARIABLES * VARIABLES], growth = 0;
     least_squares_covariance(&before->equations, covariance);
     for (size_t i = 0; i < work->parameters; i++) {
-        if (!(2 * sqrt(before->variance * covariance[i * n + i]) < undetermined))
+        if (!(2 * sqrt(before->variance * covariance[i * n + i]) < enough))
             return false;
         growth = fmax(growth, best->equations.matrix[i * n + i] * before->variance /
                                   (before->equations.matrix[i * n + i] * variance));
     }
-    return growth > sensitive * sensitive;
+    return growth > limit * limit;
 }
 
 // The window before becomes the last one.
@@ -1008,13 +1008,46 @@ static Status calibrate_return(CalibrateWork *work) {
 }
 
 // Whether the noise of this window is larger than was given, or than that of the window before.
-static bool calibrate_is_worse(const CalibrateWork *work) {
+static bool calibrate_is_worse(const CalibrateWork *work, double quantile) {
     if (work->window == 0)
         return false;
     const double uncertain =
         2 / (double)work->rows + 2 / (double)work->results[work->window - 1].rows;
-    return calibrate_variance(work, calibrate_best(work)->cost) >
-           1 + quantile_999 * sqrt(uncertain);
+    return calibrate_variance(work, calibrate_best(work)->cost) > 1 + quantile * sqrt(uncertain);
+}
+
+// Searches the window again from the result of the one before, beside what was found.
+static Status calibrate_search_again(CalibrateWork *work) {
+    const CalibrateResult *before = &work->results[work->window - 1];
+    const size_t kept = work->start_count < KEPT_MIN ? work->start_count : KEPT_MIN;
+    for (size_t i = kept; i < work->start_count; i++)
+        calibrate_drop(&work->starts[i]);
+    for (size_t i = 0; i < before->start_count; i++) {
+        CalibrateStart *start = &work->starts[kept + i];
+        *start =
+            (CalibrateStart){.number = kept + i, .cost = before->variance * (double)work->rows};
+        start->equations = before->equations;
+        memcpy(start->at, before->starts[i], sizeof start->at);
+    }
+    work->start_count = kept + before->start_count;
+    calibrate_scatter_starts(work);
+    work->stage = STAGE_SCREEN;
+    return calibrate_open(work, true);
+}
+
+// Where the motion cannot be predicted to the end of the window, the one before is the last, or
+// the part of the first one that can.
+static bool calibrate_is_beyond_horizon(const CalibrateWork *work) {
+    return work->fit == CALIBRATE_TIME && !isnan(calibrate_best(work)->horizon);
+}
+
+static Status calibrate_limit(CalibrateWork *work) {
+    if (work->window > 0)
+        return calibrate_return(work);
+    work->ends[0] = work->horizon = predictable * calibrate_best(work)->horizon;
+    work->windows = 1;
+    work->is_limited = true;
+    return calibrate_open(work, true);
 }
 
 static Status calibrate_open_spectra(CalibrateWork *work) {
@@ -1121,12 +1154,19 @@ static Status calibrate_advance(CalibrateWork *work, bool *is_over) {
     if (work->stage == STAGE_FIT) {
         const double change = calibrate_estimate_noise(work);
         calibrate_thin_starts(work);
-        if (calibrate_limit(work))
-            return calibrate_open(work, true);
+        if (calibrate_is_beyond_horizon(work) && !work->is_limited) {
+            work->is_beyond = true;
+            return calibrate_limit(work);
+        }
+        if (calibrate_may_return(work, rough))
+            return calibrate_return(work);
+        if (calibrate_is_worse(work, quantile_95) && work->retries++ < RETRIES)
+            return calibrate_search_again(work);
         calibrate_save(work);
         if (!calibrate_is_last(work)) {
             calibrate_scatter_starts(work);
             work->window++;
+            work->retries = 0;
             work->stage = STAGE_SCREEN;
             return calibrate_open(work, true);
         }
@@ -1155,12 +1195,12 @@ static Status calibrate_advance(CalibrateWork *work, bool *is_over) {
             return STATUS_OK;
         }
     }
-    if (calibrate_is_worse(work) && calibrate_may_return(work))
+    if (calibrate_is_worse(work, quantile_999) && calibrate_may_return(work, sensitive))
         return calibrate_return(work);
     calibrate_assess(work);
-    if (work->assessment.is_ambiguous && calibrate_may_return(work))
+    if (work->assessment.is_ambiguous && calibrate_may_return(work, 1))
         return calibrate_return(work);
-    if (!work->assessment.is_determined && work->is_limited && work->fit == CALIBRATE_TIME)
+    if (!work->assessment.is_determined && work->is_beyond && work->fit == CALIBRATE_TIME)
         return calibrate_open_spectra(work);
     *is_over = true;
     return STATUS_OK;
@@ -1400,6 +1440,13 @@ static Status calibrate_report_verdict(CalibrateWork *work) {
     TRY(calibrate_check_fit(work, &is_explained));
     if (!is_explained) {
         answer->verdict = CALIBRATE_NOT_EXPLAINED;
+        // The errors are those of noise, not of the model.
+        for (size_t i = 0; i < work->parameters; i++) {
+            CalibratedParameter *parameter = &answer->parameters.at[i];
+            parameter->standard_error = (double)NAN;
+            free(parameter->interval_95.at);
+            parameter->interval_95 = (Reals){NULL, 0};
+        }
         return STATUS_OK;
     }
     for (size_t i = 0; i < work->parameters; i++)
@@ -1502,7 +1549,7 @@ static void calibrate_make_windows(CalibrateWork *work) {
         samples += channel->samples.count;
     }
     for (int k = WINDOWS - 1; k >= 0; k--) {
-        const double share = 1 / (double)(1 << k);
+        const double share = pow(window_growth, -k);
         const bool is_short = share * (double)samples < (double)(SAMPLES_MIN + 4 * work->variables);
         if (k == 0 || (work->fit == CALIBRATE_TIME && !is_short))
             work->ends[work->windows++] =
@@ -1520,7 +1567,7 @@ static Status calibrate_begin(void *of, const StudyTools *tools, Problem *proble
     work->parameters = study->parameters.count;
     work->variables = work->parameters + (study->max_shift > 0);
     work->fit = study->fit;
-    work->start_count = SCREENED * starts;
+    work->start_count = SCREENED_FIRST * starts;
     work->targets = calloc(count, sizeof *work->targets);
     work->deviations = calloc(count, sizeof *work->deviations);
     work->starts = calloc(work->start_count + EXPLORED, sizeof *work->starts);
@@ -1543,7 +1590,8 @@ static Status calibrate_begin(void *of, const StudyTools *tools, Problem *proble
     calibrate_list_runs(work);
     // Every start takes all its steps in every window, with every estimate of the noise.
     // And again for every exploration.
-    const size_t rounds = (WINDOWS + 1) * (STEPS_FIRST + SCREENED) + (REPEATS + 3) * STEPS_LAST;
+    const size_t rounds =
+        (WINDOWS + 1) * (RETRIES + 1) * (STEPS_FIRST + SCREENED) + (REPEATS + 3) * STEPS_LAST;
     work->work.members = work->start_count +
                          EXPLORATIONS * (EXPLORED + IMPROVED * STEPS_LAST * (VARIABLES + 1)) +
                          starts * (rounds + 12) * (work->parameters + 1) + 4 * VARIABLES;

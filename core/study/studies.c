@@ -2,9 +2,8 @@
 #include "core/study/study.h"
 
 const StudyKind *const studies[] = {
-    &study_tradeoff,    &study_ensemble,  &study_compare,
-    &study_sensitivity, &study_sweep,     &study_response,
-    &study_optimize,    &study_fragility, NULL,
+    &study_tradeoff, &study_ensemble, &study_compare,   &study_sensitivity, &study_sweep,
+    &study_response, &study_optimize, &study_fragility, &study_calibrate,   NULL,
 };
 
 const StudyKind *study_of_answer(const Kind *answer) {

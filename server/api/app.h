@@ -37,7 +37,7 @@ bool jobs_are_light(const Request *request); // planned in some ten microseconds
 Handler jobs_create, jobs_list, jobs_show, jobs_change, jobs_dismiss, jobs_retry, jobs_scene,
     jobs_events;
 Handler results_again, results_delete, results_show, results_manifest, results_part, results_force,
-    results_bundle, results_study, sweeps_table, sweeps_point;
+    results_bundle, results_study, sweeps_table, sweeps_point, calibrations_propose;
 Handler cache_show, cache_explain, previews_create, compare_results, compare_measured;
 Handler materials_list, materials_show, materials_export, materials_import, materials_create,
     materials_revise, materials_revert, materials_review, materials_revisions, materials_history,

@@ -14,6 +14,7 @@ static const char *const of_force[] = {"points", NULL};
 static const char *const of_compare[] = {"a", "b", NULL};
 static const char *const of_measured[] = {"a",          "channel",  "align", "shift",
                                           "most_shift", "interval", "unit",  NULL};
+static const char *const of_calibration[] = {"material", "damper", NULL};
 static const char *const of_import[] = {"dry_run", NULL};
 static const char *const of_materials[] = {"q",   "kind",  "status", "e",
                                            "T_c", "limit", "after",  NULL};
@@ -74,6 +75,9 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/sensitivity",          "read",   NULL,         "The study's slopes or chart, format by Accept", results_study, NULL},
     {"GET",    "/v1/results/{id}/fragility.{format}",   "read",   NULL,         "The study's curves and distributions as json, its runs as csv or npz, or its chart as svg", results_study, NULL},
     {"GET",    "/v1/results/{id}/fragility",            "read",   NULL,         "The study's curves, runs or chart, format by Accept", results_study, NULL},
+    {"GET",    "/v1/results/{id}/calibration.{format}", "read",   NULL,         "The fitted parameters as json or csv, or measured and fitted motions as svg", results_study, NULL},
+    {"GET",    "/v1/results/{id}/calibration",          "read",   NULL,         "The fitted parameters or their chart, format by Accept", results_study, NULL},
+    {"POST",   "/v1/results/{id}/calibration/proposal", "read",   of_calibration, "The revision of a material that fitted restitution and contact time would make", calibrations_propose, NULL},
     {"GET",    "/v1/compare",                           "read",   of_compare,   "Compare two results and their inputs", compare_results, NULL},
     {"POST",   "/v1/compare",                           "read",   of_measured,  "Compare a result with a measured motion", compare_measured, NULL},
     {"GET",    "/v1/cache",                             "read",   NULL,         "Hits and misses of the caches, by layer", cache_show, NULL},

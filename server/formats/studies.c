@@ -190,6 +190,11 @@ static const struct {
       {"csv", csv_type, false, NULL},
       {"npz", "application/x-npz", true, NULL},
       {"svg", chart_type, false, chart_fragility}}},
+    {&study_calibrate,
+     calibration_table,
+     {{"json", "application/json", false, NULL},
+      {"csv", csv_type, false, NULL},
+      {"svg", chart_type, false, chart_calibration}}},
     {NULL, NULL, {{"json", "application/json", false, NULL}}}, // of any other
 };
 

@@ -93,6 +93,9 @@ void chart_response(const Variant *answer, Bytes *bytes);
 void chart_sensitivity(const Variant *answer, Bytes *bytes);
 // The probability of exceeding each limit over the intensity, and the fractiles of the metrics.
 void chart_fragility(const Variant *answer, Bytes *bytes);
+// Measured and fitted motions and their difference; and a row for each parameter.
+void chart_calibration(const Variant *answer, Bytes *bytes);
+void calibration_table(const Variant *answer, StudyTable *table);
 // Each metric of a sweep: a line over one axis, or a map over two. Size and memory are limited for
 // any number of points. False: the rows could not be read to their end.
 bool chart_sweep(const SweepDocument *document, Bytes *bytes);

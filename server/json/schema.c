@@ -53,6 +53,7 @@ const SchemaDocument schema_documents[] = {
     {"compare", "Answer of the study compare", NULL, &study_compare},
     {"sensitivity", "Answer of the study sensitivity", NULL, &study_sensitivity},
     {"fragility", "Answer of the study fragility", NULL, &study_fragility},
+    {"calibrate", "Answer of the study calibrate", NULL, &study_calibrate},
     {NULL, NULL, NULL, NULL},
 };
 // clang-format on

@@ -133,7 +133,8 @@ def test_real_answers_have_the_promised_shapes():
         swept = program.finished(daemon, program.scene("sweep_frequency"))
         sweep = {"id": swept["result"], "index": "7"}
         studies = {}
-        for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity")):
+        for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity"),
+                           ("calibrate_free_sponge", "calibration")):
             studies[kind] = {"id": program.finished(daemon, program.scene(name))["result"]}
         values = {"/v1/results/{id}/table.{format}": sweep, "/v1/results/{id}/table": sweep,
                   "/v1/results/{id}/points/{index}": sweep, "/v1/results/{id}/points/{index}/scene": sweep,
@@ -205,6 +206,11 @@ def test_real_answers_have_the_promised_shapes():
                               (target, {"Accept": "application/x-npy"}))
                 call(method, path, part, headers={**kind, "Range": "bytes=0-9"})
                 call(method, path, part, headers={**kind, "Range": "bytes=99999999-"})
+
+        proposal, calibration = "/v1/results/{id}/calibration/proposal", studies["calibration"]["id"]
+        for result, query in ((calibration, "?material=sponge"), (calibration, ""), (calibration, "?material=none"),
+                              (job["result"], "?material=sponge"), (calibration, "?material=sponge&damper=2")):
+            call("POST", proposal, f"/v1/results/{result}/calibration/proposal{query}")
 
         felt = {"slug": "felt", "name": "Felt", "restitution": 0.3, "contact_time": 0.02, "source": "here"}
         assert call("POST", "/v1/materials", "/v1/materials", json=felt) == {"Location", "ETag"}

@@ -344,6 +344,15 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
         tally->intervals++;
         tally->contained += is_contained;
         is_lost |= off > 6 && !is_contained;
+        if (!is_contained && getenv("CALIBRATE_MISSED") != NULL)
+            printf("missed %llu kind %d %zu/%zu: off %.2f, outside by %.2g of the interval, cost %.6g truth %.6g, "
+                   "samples %llu of %zu, widest %.2g %s\n",
+                   (unsigned long long)number, kind, i, trial->count, off,
+                   fmax(parameter->interval_95.at[0] - trial->truth[i],
+                        trial->truth[i] - parameter->interval_95.at[1]) /
+                       (parameter->interval_95.at[1] - parameter->interval_95.at[0]),
+                   fit_cost, true_cost, (unsigned long long)answer->residuals.at[0].samples, count,
+                   widest, answer->fit == CALIBRATE_PSD ? "PSD" : "");
         if (getenv("CALIBRATE_VERBOSE") != NULL)
             printf("   %zu: true %.6g fit %.6g +- %.3g (%.1f)\n", i, trial->truth[i],
                    parameter->value, parameter->standard_error, off);
@@ -375,6 +384,19 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
                 cost += pow((base[m] - measured[m]) / deviation[m / count], 2);
             printf("   line %g: %.6g\n", k / 16.0, cost);
         }
+    if (getenv("CALIBRATE_LINE") != NULL)
+        for (size_t p = 0; p < trial->count; p++)
+            for (int k = -14; k <= 14; k++) {
+                double values[CALIBRATE_PARAMETERS], cost = 0;
+                for (size_t i = 0; i < trial->count; i++)
+                    values[i] = answer->parameters.at[i].value;
+                const double d = (k < 0 ? -1 : 1) * (k == 0 ? 0 : pow(2, abs(k) - 6));
+                values[p] += d * answer->parameters.at[p].standard_error;
+                scene_run(study, &request.simulation, trial, values, base, count);
+                for (size_t m = 0; m < trial->channel_count * count; m++)
+                    cost += pow((base[m] - measured[m]) / deviation[m / count], 2);
+                printf("   parameter %zu at %g: %.6g\n", p, d, cost);
+            }
     if (getenv("CALIBRATE_HISTORY") != NULL)
         for (size_t i = 0; i < answer->history.count; i++) {
             const CalibrationStep *step = &answer->history.at[i];

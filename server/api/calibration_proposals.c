@@ -1,0 +1,144 @@
+// The revision of a material that a calibration proposes, which nothing writes until a user sends
+// it back: restitution and contact time of one damper's buffer, as fitted.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/study/calibrate.h"
+#include "server/api/materials.h"
+#include "server/jobs/documents.h"
+#include "server/json/encode.h"
+#include "server/materials/material.h"
+#include "server/util/base_path.h"
+
+// A fitted parameter of a buffer by its member's name, of damper `damper` (from 1) or, if 0, of the
+// first one that has it; NULL: none.
+static const CalibratedParameter *calibration_find(const Calibration *calibration, uint64_t damper,
+                                                   const char *member) {
+    static const char before[] = "/dampers/";
+    for (size_t i = 0; i < calibration->parameters.count; i++) {
+        const CalibratedParameter *parameter = &calibration->parameters.at[i];
+        const char *name = strrchr(parameter->pointer, '/');
+        if (strncmp(parameter->pointer, before, sizeof before - 1) != 0 ||
+            strstr(parameter->pointer, "buffer/") == NULL || strcmp(name + 1, member) != 0)
+            continue;
+        const uint64_t number = strtoull(parameter->pointer + sizeof before - 1, NULL, 10) + 1;
+        if (damper == 0 || number == damper)
+            return parameter;
+    }
+    return NULL;
+}
+
+// Why there is no proposal; NULL: there is one.
+static const char *calibration_refuse(const Calibration *calibration,
+                                      const CalibratedParameter *restitution,
+                                      const CalibratedParameter *contact_time) {
+    if (calibration->verdict == CALIBRATE_NOT_EXPLAINED)
+        return "the fitted scene does not explain the measured motions";
+    if (!restitution->is_identifiable)
+        return "the measured motions do not determine the restitution";
+    if (!contact_time->is_identifiable)
+        return "the measured motions do not determine the contact time";
+    return NULL;
+}
+
+// The head with the fitted numbers, valid at any speed: what only drop tests tell is removed.
+static Status calibration_describe(const Material *head, const char *result,
+                                   const CalibratedParameter *restitution,
+                                   const CalibratedParameter *contact_time, Material *material) {
+    TRY(fields_copy(material_fields, head, material));
+    material->restitution = restitution->value;
+    material->restitution_deviation = restitution->standard_error;
+    material->contact_time = contact_time->value;
+    material->contact_time_deviation = contact_time->standard_error;
+    material->least_speed = material->most_speed = (double)NAN;
+    free(material->table.at);
+    free(material->measurements.at);
+    material->table = (MaterialRows){NULL, 0};
+    material->measurements = (Reals){NULL, 0};
+    return status_made(text_format(&material->source, "calibration %s", result));
+}
+
+static Status calibration_write(const MaterialRevision *head, const ResultRow *row,
+                                const Calibration *calibration, uint64_t damper, Bytes *bytes,
+                                Problem *problem) {
+    const CalibratedParameter *restitution = calibration_find(calibration, damper, "restitution");
+    const CalibratedParameter *contact_time = calibration_find(calibration, damper, "contact_time");
+    if (restitution == NULL || contact_time == NULL)
+        return problem_set(problem, STATUS_CONFLICT,
+                           "the calibration did not fit %s of a damper's buffer: a proposal needs "
+                           "its restitution and its contact_time",
+                           restitution == NULL ? "the restitution" : "the contact time");
+    const char *why = calibration_refuse(calibration, restitution, contact_time);
+    const char *base = base_path();
+    Material material = {.name = NULL};
+    Status status = STATUS_OK;
+    bytes_json(bytes, "{\"slug\": %s, \"result\": %s, \"revision\": ", head->slug, row->id);
+    if (why == NULL) { // as POST to /revisions takes it
+        status =
+            calibration_describe(&head->material, row->id, restitution, contact_time, &material);
+        bytes_text(bytes, "{");
+        if (status == STATUS_OK)
+            (void)encode_members(bytes, material_fields, &material, WRITE_SCENE);
+        bytes_json(bytes, ", \"comment\": \"from calibration %s\"}", row->id);
+        fields_clear(material_fields, &material);
+    } else {
+        bytes_text(bytes, "null");
+    }
+    bytes_text(bytes, ", \"why\": ");
+    bytes_json_string(bytes, why);
+    bytes_json(bytes,
+               ", \"links\": {\"calibration\": \"%s/v1/results/%s/calibration.json\", "
+               "\"confirm\": \"%s/v1/materials/%s/revisions\", \"material\": "
+               "\"%s/v1/materials/%s\"}}\n",
+               base, row->id, base, head->slug, base, head->slug);
+    return status == STATUS_OK ? status
+                               : problem_set(problem, status, "no memory for the proposal");
+}
+
+static Status calibration_load(App *app, const Request *request, ResultRow *row,
+                               StudyAnswer *answer, Problem *problem) {
+    TRY(db_result_load(app->db, request->parameters[0], row, problem));
+    if (row->study != NULL)
+        TRY(study_read(row, answer, problem));
+    if (answer->study == NULL || answer->study->kind != study_calibrate.answer)
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "the scene asked for no study \"calibrate\": submit it with a member "
+                           "study");
+    return STATUS_OK;
+}
+
+Status calibrations_propose(App *app, const Request *request, Reply *reply, Problem *problem) {
+    const char *slug = request_query(request, "material");
+    double damper;
+    if (slug == NULL || !material_slug_is_valid(slug))
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"material\" is required: the slug of the material "
+                           "that gets the revision");
+    TRY(request_number(request, "damper", 0, SCENE_DAMPERS, 0, &damper, problem));
+    ResultRow row = {0};
+    StudyAnswer answer = {NULL};
+    MaterialRevision head = {.slug = NULL};
+    MaterialState state = {0, 0, 0};
+    char tag[MATERIAL_TAG];
+    Bytes bytes = {.most = app->reply_most};
+    Status status = calibration_load(app, request, &row, &answer, problem);
+    if (status == STATUS_OK)
+        status = db_material_state(app->db, slug, &state, problem);
+    if (status == STATUS_OK)
+        status = material_latest(app, slug, &head, problem);
+    if (status == STATUS_OK)
+        status = calibration_write(&head, &row, (const Calibration *)(const void *)answer.study,
+                                   (uint64_t)damper, &bytes, problem);
+    if (status == STATUS_OK) {
+        // For If-Match of the POST that confirms it.
+        material_tag(slug, state.latest, state.version, tag);
+        if (!reply_tagged(reply, request, tag))
+            status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    }
+    bytes_clear(&bytes);
+    material_revision_clear(&head);
+    fields_clear(study_answer_fields, &answer);
+    result_row_clear(&row);
+    return status;
+}

@@ -1,0 +1,100 @@
+// The chart and the table of a calibration.
+#include <math.h>
+
+#include "core/study/calibrate.h"
+#include "server/formats/chart.h"
+#include "server/formats/study_formats.h"
+
+enum { MOTIONS_DRAWN = 3 };
+
+// "POINTER = VALUE (LOW to HIGH) UNIT"
+static const char *calibration_parameter_text(Chart *chart, const CalibratedParameter *parameter) {
+    const Reals *interval = &parameter->interval_95;
+    const char *unit = parameter->unit != NULL ? parameter->unit : "";
+    if (isnan(parameter->value))
+        return chart_text(chart, "%.80s is unknown", parameter->pointer);
+    if (interval->count != 2 || !parameter->is_identifiable)
+        return chart_text(chart, "%.80s = %.4g %s%s", parameter->pointer, parameter->value, unit,
+                          parameter->is_identifiable ? "" : " (not determined)");
+    return chart_text(chart, "%.80s = %.4g (%.4g to %.4g) %s", parameter->pointer, parameter->value,
+                      interval->at[0], interval->at[1], unit);
+}
+
+static size_t calibration_motion_count(const CalibrationMotion *motion) {
+    const size_t count =
+        motion->at.count < motion->measured.count ? motion->at.count : motion->measured.count;
+    return count < motion->fitted.count ? count : motion->fitted.count;
+}
+
+static void calibration_add_motion(Chart *chart, const CalibrationMotion *motion) {
+    const size_t count = calibration_motion_count(motion);
+    const char *quantity = chart_quantity(chart, motion->channel, motion->unit);
+    ChartPanel *panel = motion->is_spectrum ? chart_spectra(chart, quantity, 180)
+                                            : chart_panel(chart, quantity, 180);
+    chart_add(panel, (ChartSeries){CHART_LINE, motion->at.at, motion->fitted.at, NULL, count,
+                                   .colour = CHART_STRONG, .name = "fitted", .legend = "fitted"});
+    chart_add(panel, (ChartSeries){CHART_LINE, motion->at.at, motion->measured.at, NULL, count,
+                                   .colour = 0, .name = "measured", .legend = "measured"});
+    if (motion->is_spectrum)
+        return;
+    double *difference = chart_new(chart, count + 1, sizeof *difference);
+    for (size_t i = 0; difference != NULL && i < count; i++)
+        difference[i] = motion->fitted.at[i] - motion->measured.at[i];
+    panel->x.is_unlabelled = true;
+    panel = chart_panel(
+        chart,
+        chart_text(chart, "fitted less measured%s%s%s", motion->unit != NULL ? " [" : "",
+                   motion->unit != NULL ? motion->unit : "", motion->unit != NULL ? "]" : ""),
+        90);
+    panel->x.title = "time [s]";
+    if (difference != NULL)
+        chart_add(panel, (ChartSeries){CHART_LINE, motion->at.at, difference, NULL, count,
+                                       .colour = 1, .name = "difference"});
+}
+
+void chart_calibration(const Variant *answer, Bytes *bytes) {
+    const Calibration *calibration = (const Calibration *)(const void *)answer;
+    Chart chart = {.width = 760, .left = 80, .right = 110, .title = "Calibration"};
+    chart.heading = calibration->parameters.count > 0
+                        ? calibration_parameter_text(&chart, &calibration->parameters.at[0])
+                        : NULL;
+    if (calibration->parameters.count > 1)
+        chart.heading = chart_text(&chart, "%s, and %zu more", chart.heading,
+                                   calibration->parameters.count - 1);
+    chart_note(&chart, "", calibration->detail);
+    for (size_t i = 0; i < calibration->parameters.count; i++)
+        chart_note(&chart, " ", calibration_parameter_text(&chart, &calibration->parameters.at[i]));
+    for (size_t i = 0; i < calibration->motions.count; i++)
+        if (i < MOTIONS_DRAWN)
+            calibration_add_motion(&chart, &calibration->motions.at[i]);
+        else
+            chart_note(&chart, " Not drawn: ", calibration->motions.at[i].channel);
+    if (calibration->motions.count == 0) // every run failed
+        chart_panel(&chart, "no fit", 60);
+    chart_write(&chart, bytes);
+}
+
+// A row for each parameter.
+void calibration_table(const Variant *answer, StudyTable *table) {
+    const Calibration *calibration = (const Calibration *)(const void *)answer;
+    table->rows = calibration->parameters.count;
+    const size_t pointer = study_table_add(table, "pointer", NULL);
+    const size_t unit = study_table_add(table, "unit", NULL);
+    const size_t value = study_table_add(table, "value", NULL);
+    const size_t error = study_table_add(table, "standard_error", NULL);
+    const size_t low = study_table_add(table, "low", NULL);
+    const size_t high = study_table_add(table, "high", NULL);
+    const size_t identifiable = study_table_add(table, "identifiable", NULL);
+    for (size_t i = 0; i < table->rows; i++) {
+        const CalibratedParameter *parameter = &calibration->parameters.at[i];
+        study_table_set_word(table, pointer, i, parameter->pointer);
+        study_table_set_word(table, unit, i, parameter->unit != NULL ? parameter->unit : "1");
+        study_table_set(table, value, i, parameter->value);
+        study_table_set(table, error, i, parameter->standard_error);
+        if (parameter->interval_95.count == 2) {
+            study_table_set(table, low, i, parameter->interval_95.at[0]);
+            study_table_set(table, high, i, parameter->interval_95.at[1]);
+        }
+        study_table_set_word(table, identifiable, i, parameter->is_identifiable ? "true" : "false");
+    }
+}

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""The study calibrate as users meet it: its formats, the proposal for a material, faults, equal bytes."""
+
+import json
+import os
+import sys
+import xml.etree.ElementTree
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
+
+SANITIZED = "nightly"
+
+
+def test_a_calibration_becomes_a_revision_of_a_material():
+    """Parameters as JSON and CSV, a chart; the proposal is confirmed with its ETag, and is the material's newest revision."""
+    scene = program.scene("calibrate_free_sponge")
+    with program.daemon() as daemon:
+        result = program.finished(daemon, scene)["result"]
+        answer = daemon.get(f"/v1/results/{result}/calibration.json").json()
+        assert answer["verdict"] == "explained" and answer["failed"] == 0 and answer["runs"] > 100
+        for parameter, truth in zip(answer["parameters"], (0.61, 0.025)):
+            low, high = parameter["interval_95"]
+            assert parameter["identifiable"] and low < truth < high, parameter
+        rows = daemon.get(f"/v1/results/{result}/calibration.csv").body.decode().splitlines()
+        assert len(rows) == 3 and rows[1].startswith("/dampers/0/buffer/restitution,1,0.6"), rows
+        chart = daemon.get(f"/v1/results/{result}/calibration.svg").body
+        assert xml.etree.ElementTree.fromstring(chart).tag.endswith("svg") and b"measured" in chart
+        asked = daemon.request("POST", f"/v1/results/{result}/calibration/proposal?material=sponge")
+        proposal = asked.json()
+        assert proposal["why"] is None and proposal["revision"]["restitution"] == answer["parameters"][0]["value"]
+        confirmed = daemon.request("POST", proposal["links"]["confirm"], json=proposal["revision"],
+                                   headers={"If-Match": asked.headers["etag"]})
+        assert confirmed.status == 201, confirmed
+        newest = daemon.get("/v1/materials/sponge@2").json()
+        assert newest["contact_time_deviation"] == answer["parameters"][1]["standard_error"]
+
+
+def test_the_bytes_are_those_of_one_thread():
+    """The command, on one thread, gives the document of a daemon with three workers."""
+    scene = program.scene("calibrate_free_sponge")
+    code, out, errors = program.run("study", "-", text=json.dumps(scene))
+    assert code == 0, errors
+    with program.daemon("--workers", "3") as daemon:
+        result = program.finished(daemon, scene)["result"]
+        assert daemon.get(f"/v1/results/{result}/calibration.json").json() == json.loads(out)
+
+
+if __name__ == "__main__":
+    program.main(globals())
