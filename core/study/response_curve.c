@@ -19,14 +19,15 @@
 #include "core/study/sweep.h"
 
 enum {
-    CURVE_BRANCHES = 64, // continued
-    CURVE_FACTOR = 4,    // points of the continuation over those of the axis
+    CURVE_BRANCHES = 64,   // continued
+    CURVE_CONTINUED = 200, // points of the continuation, beside four for each value
     CURVE_CORRECTIONS = 8,
-    CURVE_EASY = 4,        // corrections after which the step grows
+    CURVE_EASY = 4,        // corrections up to which the step grows
+    CURVE_HARD = 5,        // and beyond which it shrinks
     CURVE_WANDER_MIN = 32, // cycles of a motion without a period
 };
 
-static const double CURVE_STEP = 0.02, CURVE_STEP_MIN = 1e-5, CURVE_STEP_MAX = 0.05;
+static const double CURVE_STEP = 0.02, CURVE_STEP_MIN = 1e-4, CURVE_STEP_MAX = 0.05;
 static const double CURVE_PRECISION = 1e-10;
 static const double CURVE_DIFFERENCE = 1e-7; // of the value, over the axis's range
 static const double CURVE_JUMP = 0.5;        // between points: another branch
@@ -41,7 +42,7 @@ static const Field response_study_fields[] = {
     FIELD_CHOICE(ResponseStudy, direction, curve_direction_names, CURVE_UP, "up: from, then on to to, each point from the state of the one before; down: the reverse; both: up, then down"),
     FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic; fewer where a stable orbit is found earlier"),
     FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CURVE_PERIOD), 8, "longest period searched for, in cycles of the sine"),
-    FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits"),
+    FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits: at most four points for each value of the axis, and 200"),
     FIELD_COUNT(ResponseStudy, section_points, NULL, WITHIN(0, CURVE_SECTION), 64, "points of the section where no periodic orbit is found"),
     FIELD_BASE(ResponseStudy, names, study_names_fields),
     FIELD_END
@@ -192,6 +193,14 @@ static void curve_references(void *request, StudyReferences *references) {
     *references = (StudyReferences){.names = &study->names}; // the axis has numbers
 }
 
+static size_t curve_continued(const ResponseStudy *study) {
+    return study->continuation ? 4 * (size_t)study->axis.count + CURVE_CONTINUED : 0;
+}
+
+static size_t curve_points_max(const ResponseStudy *study) {
+    return curve_points(study) + curve_continued(study);
+}
+
 static size_t curve_wander_cycles(const ResponseStudy *study) {
     return study->section_points > CURVE_WANDER_MIN ? (size_t)study->section_points
                                                     : CURVE_WANDER_MIN;
@@ -207,8 +216,7 @@ static Status curve_cost(const void *request, const Simulation *simulation,
     double cycles = (double)study->settle_cycles + 2 * (double)curve_wander_cycles(study) +
                     4 * columns * (double)study->max_period;
     cycles *= (double)curve_points(study);
-    if (study->continuation)
-        cycles += (double)study->axis.count * CURVE_FACTOR * 4 * columns * 2;
+    cycles += (double)curve_continued(study) * 4 * columns * 2;
     (void)limits;
     *steps = cycles * cycle;
     return STATUS_OK;
@@ -355,8 +363,7 @@ static Status curve_fail(CurveWork *work, Status status, size_t number) {
 
 static Status curve_advance(CurveWork *work) {
     const ResponseStudy *study = work->study;
-    const double all = (double)curve_points(study) +
-                       (study->continuation ? CURVE_FACTOR * (double)study->axis.count : 0);
+    const double all = (double)(curve_points(study) + curve_continued(study));
     work->range.from = fmin((double)work->answer->points.count / all, 1);
     return study_advance(work->tools->progress, work->range.from, work->problem);
 }
@@ -482,16 +489,13 @@ static Status curve_correct(CurveWork *work, const CycleFlow *from, size_t perio
     return STATUS_OK;
 }
 
-static size_t curve_continued_max(const CurveWork *work) {
-    return curve_points(work->study) + CURVE_FACTOR * (size_t)work->study->axis.count;
-}
-
 // Follows the branch of an orbit to one side until it leaves the axis or is lost.
 static Status curve_follow(CurveWork *work, const CurveStart *start, size_t period, double side) {
     OrbitSearch *search = &work->search;
     const size_t n = search->size;
     const double from = work->study->axis.from / curve_span(work),
                  to = work->study->axis.to / curve_span(work);
+    const size_t first = work->answer->points.count;
     CycleFlow *flow = NULL;
     double step = CURVE_STEP, change;
     cycle_flow_get(start->flow, work->z);
@@ -506,7 +510,8 @@ static Status curve_follow(CurveWork *work, const CurveStart *start, size_t peri
     bool goes_on = change <= 100 * CURVE_PRECISION && curve_turn(work);
     memcpy(work->at, work->z, (n + 1) * sizeof *work->at);
     while (goes_on && status == STATUS_OK && step >= CURVE_STEP_MIN &&
-           work->answer->points.count + 1 < curve_continued_max(work)) {
+           work->answer->points.count - first < curve_continued(work->study) / 4 &&
+           work->answer->points.count + 1 < curve_points_max(work->study)) {
         int count;
         CycleFlow *next = NULL;
         status = curve_advance(work);
@@ -521,7 +526,9 @@ static Status curve_follow(CurveWork *work, const CurveStart *start, size_t peri
         const double value = work->z[n];
         goes_on = value >= from && value <= to;
         memcpy(work->at, work->z, (n + 1) * sizeof *work->at);
-        step = count < CURVE_EASY ? fmin(1.5 * step, CURVE_STEP_MAX) : step / 2;
+        step = count < CURVE_EASY   ? fmin(1.5 * step, CURVE_STEP_MAX)
+               : count > CURVE_HARD ? step / 2
+                                    : step;
         if (!goes_on || status != STATUS_OK)
             break;
         ResponsePoint *point = curve_add_point(work, value * curve_span(work), CHOICE_ABSENT);
@@ -572,7 +579,7 @@ static Status curve_continue(CurveWork *work, const CurveStart *start) {
     ResponsePoints *points = &work->answer->points;
     const ResponsePoint begin = points->at[start->point];
     const size_t first = points->count, period = (size_t)begin.period;
-    if (curve_is_followed(work, &begin) || first >= curve_continued_max(work))
+    if (curve_is_followed(work, &begin) || first >= curve_points_max(work->study))
         return STATUS_OK;
     TRY(curve_make_search(work, cycle_flow_size(start->flow)));
     cycle_flow_scales(start->flow, work->search.scales);
@@ -598,12 +605,12 @@ static Status curve_continue_all(CurveWork *work) {
     work->matrix = work->by_value + VECTOR;
     for (size_t i = 0; i < work->start_count; i++)
         TRY(curve_continue(work, &work->starts[i]));
-    return work->answer->points.count + 1 < curve_continued_max(work)
+    return work->answer->points.count + 1 < curve_points_max(work->study)
                ? STATUS_OK
                : warnings_add(&work->answer->warnings, "/study/continuation",
                               "the continuation ended at its limit of %zu points: give a larger "
                               "count or a shorter range",
-                              CURVE_FACTOR * (size_t)work->study->axis.count);
+                              curve_continued(work->study));
 }
 
 static Status curve_begin(void *of, const StudyTools *tools, Problem *problem) {
