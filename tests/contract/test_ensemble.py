@@ -295,6 +295,28 @@ def test_uncertain_inputs_have_quantiles_and_indices():
     assert {one["pointer"] for one in answer["indices"]} == {"/dampers/0/clearance", "/dampers/0/buffer"}
 
 
+def test_a_material_gives_its_recorded_spread():
+    """Distribution material has the deviations of the revision; the completed scene has them and the same result."""
+    scene = {**program.scene("paper_free_sponge"), "duration": 1}
+    scene["study"] = {"kind": "ensemble", "runs": 8, "inputs": [{"pointer": "/dampers/0/buffer", "distribution": "material"}]}
+    with program.daemon() as daemon:
+        refused = daemon.request("POST", "/v1/jobs?dry_run=1", json=scene)  # nobody recorded the paper's
+        assert [fault["pointer"] for fault in refused.json()["errors"]] == ["/study/inputs/0"]
+        foam = {"slug": "foam", "name": "Foam", "restitution": 0.5, "restitution_deviation": 0.05, "contact_time": 0.02,
+                "contact_time_deviation": 0.001, "source": "a test"}
+        reply = daemon.request("POST", "/v1/materials", json=foam)
+        assert reply.status == 201, reply.body
+        scene["dampers"][0]["buffer"] = "foam"
+        plan = daemon.request("POST", "/v1/jobs?dry_run=1", json=scene).json()
+        (told,) = plan["scene"]["study"]["inputs"]
+        assert abs(told["restitution_deviation"] - 0.1) < 1e-15 and abs(told["contact_time_deviation"] - 0.05) < 1e-15
+        assert daemon.request("POST", "/v1/jobs?dry_run=1", json=plan["scene"]).json()["result"] == plan["result"]
+        result = program.finished(daemon, scene)["result"]
+        answer = daemon.get(f"/v1/results/{result}/ensemble.json").json()
+        assert [one["pointer"].rsplit("/", 1)[1] for one in answer["inputs"]] == ["restitution", "contact_time"]
+        assert all(0.5 < factor < 2 for row in answer["table"] for factor in row["inputs"])
+
+
 def test_seeds_that_fail_are_rows():
     """Where some seeds meet a limit, the study goes on, counts them and tells why; the rest is of the others."""
     scene = study(duration=5, runs=40)
