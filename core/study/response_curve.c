@@ -603,8 +603,11 @@ static Status curve_continue_all(CurveWork *work) {
     work->tangent = work->at + VECTOR;
     work->by_value = work->tangent + VECTOR;
     work->matrix = work->by_value + VECTOR;
-    for (size_t i = 0; i < work->start_count; i++)
-        TRY(curve_continue(work, &work->starts[i]));
+    // Short periods first: long ones are many.
+    for (size_t period = 1; period <= work->study->max_period; period++)
+        for (size_t i = 0; i < work->start_count; i++)
+            if (work->answer->points.at[work->starts[i].point].period == period)
+                TRY(curve_continue(work, &work->starts[i]));
     return work->answer->points.count + 1 < curve_points_max(work->study)
                ? STATUS_OK
                : warnings_add(&work->answer->warnings, "/study/continuation",
