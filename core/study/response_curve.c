@@ -368,7 +368,7 @@ static Status curve_advance(CurveWork *work) {
     return study_advance(work->tools->progress, work->range.from, work->problem);
 }
 
-static Status curve_sweep(CurveWork *work, CurveDirection direction) {
+static Status curve_sweep(CurveWork *work, int direction) {
     const StudyAxis *axis = &work->study->axis;
     for (size_t i = 0; i < axis->count; i++) {
         const size_t number = work->answer->points.count;
@@ -510,7 +510,7 @@ static Status curve_follow(CurveWork *work, const CurveStart *start, size_t peri
     bool goes_on = change <= 100 * CURVE_PRECISION && curve_turn(work);
     memcpy(work->at, work->z, (n + 1) * sizeof *work->at);
     while (goes_on && status == STATUS_OK && step >= CURVE_STEP_MIN &&
-           work->answer->points.count - first < curve_continued(work->study) / 4 &&
+           work->answer->points.count - first < curve_continued(work->study) / 8 &&
            work->answer->points.count + 1 < curve_points_max(work->study)) {
         int count;
         CycleFlow *next = NULL;
