@@ -326,6 +326,11 @@ static Status fragility_measure(FragilityWork *work, const StudyTools *tools, Pr
                                            intensity->damping_ratio, intensity->period,
                                            tools->progress, &curve->intensity) != STATUS_OK)
             return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+        if (!(curve->intensity > 0) || !isfinite(curve->intensity))
+            return problem_set(problem, STATUS_UNSTABLE,
+                               "the intensity of the record %.64s is %g m/s^2, which no factor "
+                               "scales to a level",
+                               record->name, curve->intensity);
         curve->points.at = calloc(work->levels, sizeof *curve->points.at);
         TRY(status_made(curve->points.at != NULL));
         curve->points.count = work->levels;
@@ -502,8 +507,11 @@ static Status fragility_end(void *of, const StudyTools *tools, Problem *problem)
         if (status == STATUS_OK)
             status = fragility_add_fractiles(work, m, values);
     }
-    for (size_t i = 0; i < work->study->limits.count && status == STATUS_OK; i++)
-        status = fragility_add_state(work, i, intervals);
+    for (size_t i = 0; i < work->study->limits.count && status == STATUS_OK; i++) {
+        status = study_advance(tools->progress, 1, problem);
+        if (status == STATUS_OK)
+            status = fragility_add_state(work, i, intervals);
+    }
     free(values);
     free(intervals);
     return status;

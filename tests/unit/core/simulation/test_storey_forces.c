@@ -93,8 +93,8 @@ TEST(the_base_shear_of_one_mass_is_that_of_its_spring_and_dashpot) {
     static const char *const kinds[] = {
         "\"mass\": 100, \"stiffness\": 9e4, \"damping\": 60",
         "\"kind\": \"frame\", \"masses\": [100], \"stiffnesses\": [9e4], \"dampings\": [60]",
-        "\"kind\": \"matrices\", \"mass\": [[100]], \"stiffness\": [[9e4]], \"damping\": [[60]], "
-        "\"influence\": [1]"};
+        ("\"kind\": \"matrices\", \"mass\": [[100]], \"stiffness\": [[9e4]], \"damping\": [[60]], "
+         "\"influence\": [1]")};
     static const char *const solver_names[] = {"exact", "rk4"};
     for (size_t k = 0; k < 2 * COUNT(kinds); k++) {
         char members[1024];
