@@ -22,7 +22,7 @@
 #include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
-static unsigned long trials = 12;
+static unsigned long trials = 7;
 static uint64_t seed = 1;
 static int only = -1;
 static Problem problem;
@@ -48,7 +48,7 @@ static void parameter_add(Trial *trial, Draws *draws, const char *pointer, doubl
              trial->from[i], trial->to[i]);
 }
 
-enum { KINDS = 13 };
+enum { KINDS = 13, TIMED = 5 };
 static const char *const kind_names[KINDS] = {"free: e, T_c",
                                               "free, no damper: K, damping ratio",
                                               "sine: clearance, e",
@@ -204,6 +204,43 @@ static double cpu_now(void) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+// CPU of a calibration, and of the same runs without it.
+static void runs_time(const StudyRequest *request, Tally *tally) {
+    Workspace workspace = {0};
+    const StudyTools tools = {.workspace = &workspace};
+    Variant *answer;
+    StudyWork *work;
+    double alone = 0;
+    const double began = cpu_now();
+    if (study_begin(request->study, &request->simulation, &tools, &answer, &work, &problem) !=
+        STATUS_OK)
+        fail_msg("%s", problem.detail);
+    double begun = cpu_now() - began;
+    for (size_t i = 0; i < work->wanted; i++) {
+        StudyPart *part, *copy = calloc(1, work->kind->part_size);
+        Simulation scene = {0};
+        Outcome *outcome;
+        assert_int_equal(work->kind->scene(work, i, &scene, copy, &problem), STATUS_OK);
+        const double run_began = cpu_now();
+        if (simulation_run(&scene, NULL, NULL, &workspace, &outcome, &problem) == STATUS_OK)
+            outcome_unref(outcome);
+        alone += cpu_now() - run_began;
+        simulation_clear(&scene);
+        free(copy);
+        const double part_began = cpu_now();
+        assert_int_equal(study_part_make(work, i, &tools, &part, &problem), STATUS_OK);
+        assert_int_equal(study_part_fold(work, i, part, &problem), STATUS_OK);
+        study_part_free(work, part);
+        begun += cpu_now() - part_began;
+    }
+    assert_int_equal(study_end(work, &tools, &problem), STATUS_OK);
+    tally->cpu += begun;
+    tally->alone += alone;
+    study_free(work);
+    variant_free(answer);
+    workspace_clear(&workspace);
+}
+
 static void trial_run(Draws *draws, int kind, uint64_t number) {
     Trial *trial = calloc(1, sizeof *trial);
     trial_draw(draws, kind, trial);
@@ -308,22 +345,14 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
     Workspace workspace = {0};
     const StudyTools tools = {.workspace = &workspace};
     Variant *made;
-    const double began = cpu_now();
     const Status status = study_run(request.study, &request.simulation, &tools, &made, &problem);
     if (status != STATUS_OK)
         fail_msg("%llu: %s %s", (unsigned long long)number, status_slug(status), problem.detail);
     Tally *tally = &tallies[kind];
-    tally->cpu += cpu_now() - began;
     const Calibration *answer = (const Calibration *)(const void *)made;
     tally->runs += (double)answer->runs;
-    // The same runs alone.
-    const double began_alone = cpu_now();
-    Outcome *again;
-    for (int i = 0; i < 20; i++)
-        if (simulation_run(&request.simulation, NULL, NULL, &workspace, &again, &problem) ==
-            STATUS_OK)
-            outcome_unref(again);
-    tally->alone += (cpu_now() - began_alone) / 20;
+    if (number % TIMED == 0)
+        runs_time(&request, tally);
     tally->trials++;
     tally->determined += is_determined;
     tally->undetermined += is_undetermined;
@@ -345,7 +374,8 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
         tally->contained += is_contained;
         is_lost |= off > 6 && !is_contained;
         if (!is_contained && getenv("CALIBRATE_MISSED") != NULL)
-            printf("missed %llu kind %d %zu/%zu: off %.2f, outside by %.2g of the interval, cost %.6g truth %.6g, "
+            printf("missed %llu kind %d %zu/%zu: off %.2f, outside by %.2g of the interval, cost "
+                   "%.6g truth %.6g, "
                    "samples %llu of %zu, widest %.2g %s\n",
                    (unsigned long long)number, kind, i, trial->count, off,
                    fmax(parameter->interval_95.at[0] - trial->truth[i],
@@ -373,30 +403,6 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
     if (getenv("CALIBRATE_VERBOSE") != NULL)
         for (size_t i = 0; i < answer->warnings.count; i++)
             printf("   %s\n", answer->warnings.at[i].detail);
-    if (getenv("CALIBRATE_LINE") != NULL)
-        for (int k = -8; k <= 24; k++) {
-            double values[CALIBRATE_PARAMETERS], cost = 0;
-            for (size_t i = 0; i < trial->count; i++)
-                values[i] = answer->parameters.at[i].value +
-                            k / 16.0 * (trial->truth[i] - answer->parameters.at[i].value);
-            scene_run(study, &request.simulation, trial, values, base, count);
-            for (size_t m = 0; m < trial->channel_count * count; m++)
-                cost += pow((base[m] - measured[m]) / deviation[m / count], 2);
-            printf("   line %g: %.6g\n", k / 16.0, cost);
-        }
-    if (getenv("CALIBRATE_LINE") != NULL)
-        for (size_t p = 0; p < trial->count; p++)
-            for (int k = -14; k <= 14; k++) {
-                double values[CALIBRATE_PARAMETERS], cost = 0;
-                for (size_t i = 0; i < trial->count; i++)
-                    values[i] = answer->parameters.at[i].value;
-                const double d = (k < 0 ? -1 : 1) * (k == 0 ? 0 : pow(2, abs(k) - 6));
-                values[p] += d * answer->parameters.at[p].standard_error;
-                scene_run(study, &request.simulation, trial, values, base, count);
-                for (size_t m = 0; m < trial->channel_count * count; m++)
-                    cost += pow((base[m] - measured[m]) / deviation[m / count], 2);
-                printf("   parameter %zu at %g: %.6g\n", p, d, cost);
-            }
     if (getenv("CALIBRATE_HISTORY") != NULL)
         for (size_t i = 0; i < answer->history.count; i++) {
             const CalibrationStep *step = &answer->history.at[i];
@@ -419,13 +425,12 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
 
 static void tally_print(const char *name, const Tally *tally) {
     printf("%-36s %5lu trials, determined %4lu (wrong %3lu), not %4lu (wrong %3lu), intervals "
-           "%5lu hold %5.1f %%, not explained %lu, lost %lu, runs %.0f, CPU/run %.0f us (run "
-           "%.0f us)\n",
+           "%5lu hold %5.1f %%, not explained %lu, lost %lu, runs %.0f, CPU over that of the runs "
+           "%.2f\n",
            name, tally->trials, tally->determined, tally->wrong_determined, tally->undetermined,
            tally->wrong_undetermined, tally->intervals,
            100 * (double)tally->contained / (double)tally->intervals, tally->not_explained,
-           tally->lost, tally->runs / (double)tally->trials, 1e6 * tally->cpu / tally->runs,
-           1e6 * tally->alone / (double)tally->trials);
+           tally->lost, tally->runs / (double)tally->trials, tally->cpu / tally->alone);
 }
 
 TEST(intervals_contain_the_true_values_and_undetermined_sets_are_reported) {

@@ -1,0 +1,187 @@
+// The state of a calibration, which its search (calibrate_search.c) and its report share.
+#ifndef CORE_STUDY_CALIBRATE_INTERNAL_H
+#define CORE_STUDY_CALIBRATE_INTERNAL_H
+
+#include <math.h>
+
+#include "core/math/least_squares.h"
+#include "core/study/calibrate.h"
+
+enum {
+    CALIBRATE_VARIABLES = CALIBRATE_PARAMETERS + 1, // and the shift
+    CALIBRATE_WINDOWS = 7, // of the record, each longer than the one before
+    CALIBRATE_SAMPLES_MIN = 16,
+    CALIBRATE_KEPT = 3, // starts of the result of a window
+};
+
+static const double calibrate_quantile_95 = 1.645, calibrate_quantile_999 = 3.09; // one-sided
+
+typedef enum StartState {
+    START_EVALUATE, // its residuals are wanted
+    START_DERIVE,   // its derivatives
+    START_TRY,      // a step
+    START_DONE,
+    START_DROPPED
+} StartState;
+
+typedef struct CalibrateStart {
+    StartState state;
+    size_t number;
+    double at[CALIBRATE_VARIABLES], trial[CALIBRATE_VARIABLES];
+    double before[CALIBRATE_VARIABLES]; // at the beginning of the window
+    double cost, damping, growth, predicted;
+    double differences[CALIBRATE_VARIABLES]; // by which derivatives are taken
+    NormalEquations equations;
+    double *residual, *slope; // weighted; by the shift in its unit range
+    size_t steps;
+    double horizon, error; // of its run: trust horizon [s] and estimated error
+} CalibrateStart;
+
+// A run of the batch.
+typedef struct CalibrateRun {
+    size_t start, column;
+    double step; // of the variable `column`; 0: a point of its own
+    bool is_second;
+    double at[CALIBRATE_VARIABLES];
+} CalibrateRun;
+
+typedef enum CalibrateStage {
+    STAGE_SCREEN,
+    STAGE_FIT,
+    STAGE_COVARIANCE,
+    STAGE_EXPLORE
+} CalibrateStage;
+
+// Why a parameter is not identifiable.
+typedef enum Undetermined {
+    UNDETERMINED_NOT,
+    UNDETERMINED_WIDE,  // its interval is as wide as its range
+    UNDETERMINED_RIVAL, // another start fits as well
+    UNDETERMINED_BOUND  // the best value is beyond its range
+} Undetermined;
+
+typedef struct CalibrateAssessment {
+    double covariance[CALIBRATE_VARIABLES * CALIBRATE_VARIABLES]; // of residuals of unit variance
+    double errors[CALIBRATE_VARIABLES];                           // standard errors, of the range
+    double variance;                                              // of the residuals
+    double t; // half width of an interval over its standard error
+    Undetermined reasons[CALIBRATE_VARIABLES];
+    double low[CALIBRATE_VARIABLES], high[CALIBRATE_VARIABLES]; // ends of the intervals
+    double rivals[CALIBRATE_VARIABLES];
+    bool is_ambiguous; // points that the linear model excludes fit as well
+    bool is_determined;
+} CalibrateAssessment;
+
+// A point of the last window.
+typedef struct CalibratePoint {
+    double at[CALIBRATE_VARIABLES], cost;
+} CalibratePoint;
+
+typedef struct CalibratePoints {
+    CalibratePoint *at;
+    size_t count;
+} CalibratePoints;
+
+// The result of a window.
+typedef struct CalibrateResult {
+    NormalEquations equations; // of the best point
+    double variance, starts[CALIBRATE_KEPT][CALIBRATE_VARIABLES];
+    size_t start_count, rows;
+} CalibrateResult;
+
+typedef struct CalibrateWork {
+    StudyWork work;
+    const CalibrateStudy *study;
+    Calibration *answer;
+    size_t parameters, variables;
+    CalibrateStage stage;
+    int fit; // CalibrateFit
+    double ends[CALIBRATE_WINDOWS];
+    size_t windows, window, repeats;
+    bool is_limited; // the record is longer than can be predicted
+    bool is_beyond;  // because of its trust horizon
+    bool is_chaotic; // and spectra are fitted therefore
+    double horizon;  // where the fit ends then [s]
+    Simulation base; // of the window
+    MeasuredTarget *targets;
+    double *deviations; // given or estimated, of each channel
+    size_t rows;
+    CalibrateStart *starts;
+    size_t start_count;
+    CalibrateRun *runs; // the batch
+    size_t run_count, first;
+    double *columns[CALIBRATE_VARIABLES]; // of the start whose derivatives are folded
+    double norms[CALIBRATE_VARIABLES];    // their squares
+    size_t refinements;
+    uint64_t draws;
+    size_t explorations, retries;
+    CalibrateResult results[CALIBRATE_WINDOWS];
+    CalibratePoints points; // of the window
+    CalibrateAssessment assessment;
+} CalibrateWork;
+
+typedef struct CalibratePart {
+    StudyPart part;
+    const CalibrateRun *run;
+    double *residual, *slope;
+} CalibratePart;
+
+static inline bool calibrate_has_shift(const CalibrateWork *work) {
+    return work->variables > work->parameters;
+}
+
+static inline double calibrate_shift(const CalibrateWork *work, const double *at) {
+    return calibrate_has_shift(work) ? (2 * at[work->parameters] - 1) * work->study->max_shift : 0;
+}
+static inline double calibrate_sum_squares(const double *values, size_t count) {
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += values[i] * values[i];
+    return sum;
+}
+
+// The quantile of chi square from that of the normal distribution (Wilson and Hilferty 1931).
+static inline double calibrate_chi_square(double freedom, double quantile) {
+    const double variance = 2 / (9 * freedom);
+    return freedom * pow(1 - variance + quantile * sqrt(variance), 3);
+}
+
+static inline bool calibrate_is_logarithmic(const StudyAxis *axis) {
+    return axis->from > 0 && axis->to / axis->from >= 100;
+}
+
+static inline double calibrate_value(const StudyAxis *axis, double u) {
+    if (u <= 0 || u >= 1)
+        return u <= 0 ? axis->from : axis->to;
+    return calibrate_is_logarithmic(axis) ? axis->from * pow(axis->to / axis->from, u)
+                                          : axis->from + u * (axis->to - axis->from);
+}
+
+// The same beyond the range, for the ends of intervals.
+static inline double calibrate_value_beyond(const StudyAxis *axis, double u) {
+    return calibrate_is_logarithmic(axis) ? axis->from * pow(axis->to / axis->from, u)
+                                          : axis->from + u * (axis->to - axis->from);
+}
+
+static inline double calibrate_derivative(const StudyAxis *axis, double u) {
+    return calibrate_is_logarithmic(axis) ? calibrate_value(axis, u) * log(axis->to / axis->from)
+                                          : axis->to - axis->from;
+}
+
+// The scene of the runs that end at `end` [s], with the measured channels alone.
+Status calibrate_make_base(const CalibrateStudy *study, const Simulation *simulation, double end,
+                           Simulation *base);
+
+// The best start that is not dropped; NULL: none.
+CalibrateStart *calibrate_best(const CalibrateWork *work);
+
+// Begins the search: allocates its state and lists the first runs. STATUS_NO_MEMORY.
+Status calibrate_search_begin(CalibrateWork *work);
+// Folds a run of the batch; after its last one the next batch is listed.
+Status calibrate_search_fold(CalibrateWork *work, size_t member, CalibratePart *part);
+void calibrate_search_free(CalibrateWork *work);
+
+// Completes the answer from the best start.
+Status calibrate_report(CalibrateWork *work);
+
+#endif

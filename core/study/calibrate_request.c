@@ -1,0 +1,363 @@
+// Weighted least squares from several starts. All numbers of the search lie in [0, 1]: parameter i
+// is from + u_i (to - from), or from (to / from)^(u_i) where the range spans two decades.
+//
+// Where errors grow so fast that the motion cannot be predicted to the end of the record, its first
+// part is fitted; where this does not determine all parameters, spectra are.
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/json_pointer.h"
+#include "core/study/calibrate_internal.h"
+
+enum { SPECTRUM_SAMPLES_MIN = 64 };
+
+const char *const calibrate_fit_names[] = {"time", "psd", NULL};
+const char *const calibrate_verdict_names[] = {"explained", "not_explained", "not_identifiable",
+                                               NULL};
+
+// clang-format off
+static const Field calibrate_study_fields[] = {
+    FIELD_LIST(CalibrateStudy, parameters, study_variable_fields, CALIBRATE_PARAMETERS, PRESENCE_REQUIRED, "numbers of the scene to be fitted, each within a range from ... to"),
+    FIELD_LIST(CalibrateStudy, measured, measured_channel_fields, MEASURED_CHANNELS, PRESENCE_REQUIRED, "measured motions"),
+    FIELD_CHOICE(CalibrateStudy, fit, calibrate_fit_names, CALIBRATE_TIME, "time: sample by sample; psd: spectra by Welch's method with the settings of output.psd"),
+    FIELD_REAL(CalibrateStudy, max_shift, "s", AT_MIN(0), 0, "the measured times may be wrong by a common shift of at most this, which is fitted too"),
+    FIELD_COUNT(CalibrateStudy, starts, NULL, WITHIN(1, CALIBRATE_STARTS), 8, "points from which the search starts"),
+    FIELD_COUNT(CalibrateStudy, search_seed, NULL, WITHIN(0, 0x1p53 - 1), 1, "seed of these points"),
+    FIELD_BASE(CalibrateStudy, names, study_names_fields),
+    FIELD_END
+};
+
+const Field calibrated_parameter_fields[] = {
+    FIELD_TEXT(CalibratedParameter, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member"),
+    FIELD_TEXTS(CalibratedParameter, pointers, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "tied members, if there are several"),
+    FIELD_TEXT(CalibratedParameter, unit, 0, PRESENCE_OPTIONAL, 0, "of its value"),
+    FIELD_REAL(CalibratedParameter, value, NULL, ANY, OPTIONAL, "fitted"),
+    FIELD_REAL(CalibratedParameter, standard_error, NULL, ANY, OPTIONAL, "standard deviation of the fitted value; unknown if it is not identifiable"),
+    FIELD_REALS(CalibratedParameter, interval_95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % confidence interval"),
+    {.name = "identifiable", .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(CalibratedParameter, is_identifiable, bool), .presence = PRESENCE_DEFAULT, .doc = "the measured motions determine it within its range"},
+    FIELD_END
+};
+
+static const Field calibration_residual_fields[] = {
+    FIELD_TEXT(CalibrationResidual, channel, 0, PRESENCE_OPTIONAL, 0, "channel"),
+    FIELD_TEXT(CalibrationResidual, unit, 0, PRESENCE_OPTIONAL, 0, "of the numbers; dB of spectra"),
+    {.name = "value", .kind = FIELD_KIND_REAL, .offset = FIELD_AT(CalibrationResidual, rms, double), .range = ANY, .presence = PRESENCE_OPTIONAL, .doc = "rms of the differences between fit and measurement"},
+    FIELD_REAL(CalibrationResidual, measured_rms, NULL, ANY, OPTIONAL, "of the measured motion about its mean"),
+    FIELD_REAL(CalibrationResidual, deviation, NULL, ANY, OPTIONAL, "standard deviation of the noise, given or estimated"),
+    FIELD_COUNT(CalibrationResidual, samples, NULL, AT_MIN(0), 0, "samples compared"),
+    FIELD_END
+};
+
+static const Field calibration_motion_fields[] = {
+    FIELD_TEXT(CalibrationMotion, channel, 0, PRESENCE_OPTIONAL, 0, "channel"),
+    FIELD_TEXT(CalibrationMotion, unit, 0, PRESENCE_OPTIONAL, 0, "of the values"),
+    FIELD_FLAG(CalibrationMotion, is_spectrum, false, "of a spectrum: at frequencies [Hz], else at times [s]"),
+    FIELD_REALS(CalibrationMotion, at, NULL, ANY, 0, PRESENCE_OPTIONAL, "measured times, not shifted, or frequencies"),
+    FIELD_REALS(CalibrationMotion, measured, NULL, ANY, 0, PRESENCE_OPTIONAL, "measured values"),
+    FIELD_REALS(CalibrationMotion, fitted, NULL, ANY, 0, PRESENCE_OPTIONAL, "values of the fitted scene"),
+    FIELD_END
+};
+
+static const Field calibration_step_fields[] = {
+    FIELD_COUNT(CalibrationStep, index, NULL, AT_MIN(0), 0, "number of the step"),
+    FIELD_COUNT(CalibrationStep, start, NULL, AT_MIN(0), 0, "number of its start"),
+    FIELD_REAL(CalibrationStep, until, "s", ANY, OPTIONAL, "end of the part of the record that was fitted"),
+    FIELD_REALS(CalibrationStep, values, NULL, ANY, 0, PRESENCE_OPTIONAL, "of the parameters"),
+    FIELD_REAL(CalibrationStep, shift, "s", ANY, OPTIONAL, "of the measured times"),
+    FIELD_REAL(CalibrationStep, cost, NULL, ANY, OPTIONAL, "weighted sum of squared differences"),
+    FIELD_END
+};
+
+static const Field calibration_failure_fields[] = {
+    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
+    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
+    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
+    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
+    FIELD_END
+};
+
+static const Field calibration_fields[] = {
+    FIELD_COUNT(Calibration, runs, NULL, AT_MIN(0), 0, "runs made"),
+    FIELD_COUNT(Calibration, failed, NULL, AT_MIN(0), 0, "runs that failed"),
+    FIELD_CHOICE(Calibration, fit, calibrate_fit_names, OPTIONAL, "what was fitted in the end"),
+    FIELD_LIST(Calibration, parameters, calibrated_parameter_fields, 0, PRESENCE_DEFAULT, "fitted parameters, in the order of the request"),
+    FIELD_ROWS(Calibration, correlation, NULL, ANY, 0, PRESENCE_OPTIONAL, "correlation of the fitted values, in that order"),
+    FIELD_REAL(Calibration, shift, "s", ANY, OPTIONAL, "by which the measured times are moved to later times"),
+    FIELD_REAL(Calibration, shift_error, "s", ANY, OPTIONAL, "standard error of the shift"),
+    {.name = "residual_rms", .kind = FIELD_KIND_LIST, .offset = FIELD_LIST_AT(Calibration, residuals), .fields = calibration_residual_fields, .size = sizeof(CalibrationResidual), .presence = PRESENCE_DEFAULT, .doc = "differences between fit and measurement, channel by channel"},
+    FIELD_REAL(Calibration, chi_square, NULL, ANY, OPTIONAL, "sum of squared differences over the squared given deviations; unknown without them"),
+    FIELD_COUNT(Calibration, freedom, NULL, AT_MIN(0), OPTIONAL, "its degrees of freedom"),
+    FIELD_CHOICE(Calibration, verdict, calibrate_verdict_names, OPTIONAL, "whether the fitted scene explains the measured motions, and these determine all parameters"),
+    FIELD_TEXT(Calibration, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
+    FIELD_LIST(Calibration, motions, calibration_motion_fields, 0, PRESENCE_DEFAULT, "measured and fitted motions, thinned"),
+    FIELD_LIST(Calibration, history, calibration_step_fields, 0, PRESENCE_DEFAULT, "steps of the search"),
+    FIELD_LIST(Calibration, failures, calibration_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
+    FIELD_LIST(Calibration, warnings, warning_fields, 0, PRESENCE_DEFAULT, "doubts"),
+    FIELD_END
+};
+// clang-format on
+
+static Status calibrate_check_measured(const CalibrateStudy *study, const Simulation *simulation,
+                                       Problem *problem) {
+    const double duration = simulation->scene.duration;
+    const size_t min = study->fit == CALIBRATE_PSD ? SPECTRUM_SAMPLES_MIN : CALIBRATE_SAMPLES_MIN;
+    Status status = STATUS_OK;
+    size_t samples = 0;
+    if (study->measured.count == 0)
+        return problem_add(problem, STATUS_INVALID, "/study/measured",
+                           "must have at least one measured channel");
+    for (size_t i = 0; i < study->measured.count; i++) {
+        const MeasuredChannel *measured = &study->measured.at[i];
+        const JsonPointer place = json_pointer_at("/study/measured", i);
+        const double end = measured_time(measured, measured->samples.count - 1);
+        const double from = fmax(measured->start, study->max_shift);
+        const double to = fmin(end, duration - study->max_shift);
+        samples += measured->samples.count;
+        if (end > duration * (1 + 1e-9))
+            status = json_pointer_fault(problem, place.at, "samples",
+                                        "end at %s s, the scene ends at %s s: give the scene a "
+                                        "longer duration, or fewer samples",
+                                        real_text(end).at, real_text(duration).at);
+        else if (!((to - from) / measured->interval + 1.000001 >= (double)min))
+            status = json_pointer_fault(
+                problem, place.at, "samples",
+                "must be at least %zu within the scene%s, for a fit of %s", min,
+                study->max_shift > 0 ? ", also when they are moved by max_shift" : "",
+                study->fit == CALIBRATE_PSD ? "spectra" : "motions");
+        else if (!(measured_rms(measured) > 0))
+            status = json_pointer_fault(problem, place.at, "samples",
+                                        "all have the same value: there is no motion to fit");
+    }
+    if (samples > MEASURED_SAMPLES)
+        status = problem_add(problem, STATUS_INVALID, "/study/measured",
+                             "has %zu samples in all, at most %d are allowed: give fewer channels, "
+                             "or a longer interval",
+                             samples, MEASURED_SAMPLES);
+    if (study->fit == CALIBRATE_PSD && study->max_shift > 0)
+        status = problem_add(problem, STATUS_INVALID, "/study/max_shift",
+                             "must be 0 for a fit of spectra, which do not depend on it");
+    return status;
+}
+
+// Members that are not part of the physics.
+static Status calibrate_check_pointer(const char *pointer, const Field *row, bool is_tag,
+                                      const char *place, Problem *problem) {
+    static const char *const refused[] = {"/sample_rate", "/duration", "/output", "/accuracy"};
+    for (size_t i = 0; i < COUNT(refused); i++)
+        if (strncmp(pointer, refused[i], strlen(refused[i])) == 0)
+            return problem_add(problem, STATUS_INVALID, place,
+                               "%s cannot be fitted: give a member of the structure, the dampers, "
+                               "the contact or the excitation",
+                               pointer);
+    if (is_tag || (row->kind != FIELD_KIND_REAL && row->kind != FIELD_KIND_REALS &&
+                   row->kind != FIELD_KIND_ROWS))
+        return problem_add(problem, STATUS_INVALID, place, "%s is not a real number", pointer);
+    return STATUS_OK;
+}
+
+// The scene with all parameters in the middle but one.
+static Status calibrate_check_end(const CalibrateStudy *study, const Simulation *base,
+                                  const SimulationLimits *limits, size_t changed, double u,
+                                  Problem *problem) {
+    StudyValue values[CALIBRATE_PARAMETERS];
+    const StudyAxes *axes = &study->parameters;
+    for (size_t i = 0; i < axes->count; i++)
+        values[i] = (StudyValue){NULL, calibrate_value(&axes->at[i], i == changed ? u : 0.5)};
+    Simulation scene = {0};
+    Problem *own = calloc(1, sizeof *own);
+    TRY(status_made(own != NULL));
+    const Status status =
+        study_scene_make(base, axes, values, &study->names, false, limits, &scene, own);
+    simulation_clear(&scene);
+    static const char before[] = "/output/channels/";
+    for (size_t i = 0; i < own->count && i < PROBLEM_FAULTS && status == STATUS_INVALID; i++) {
+        const Fault *fault = &own->faults[i];
+        if (strncmp(fault->pointer, before, sizeof before - 1) == 0) {
+            const size_t channel = strtoul(fault->pointer + sizeof before - 1, NULL, 10);
+            const char *name = base->output.channels.at[channel];
+            for (size_t k = 0; k < study->measured.count; k++)
+                if (strcmp(study->measured.at[k].channel, name) == 0)
+                    (void)json_pointer_fault(problem, json_pointer_at("/study/measured", k).at,
+                                             "channel", "%s", fault->detail);
+            continue;
+        }
+        const JsonPointer axis = changed < axes->count
+                                     ? json_pointer_at("/study/parameters", changed)
+                                     : (JsonPointer){"/study/parameters"};
+        if (changed < axes->count)
+            (void)json_pointer_fault(problem, axis.at, u > 0 ? "to" : "from",
+                                     "gives a scene that is not valid: %s: %s", fault->pointer,
+                                     fault->detail);
+        else
+            (void)problem_add(problem, STATUS_INVALID, axis.at,
+                              "give, in the middle of their ranges, a scene that is not valid: "
+                              "%s: %s",
+                              fault->pointer, fault->detail);
+    }
+    if (status != STATUS_OK && status != STATUS_INVALID)
+        (void)problem_set(problem, status, "%s", own->detail);
+    free(own);
+    return status;
+}
+
+static Status calibrate_check_ends(const CalibrateStudy *study, const Simulation *simulation,
+                                   const SimulationLimits *limits, Problem *problem) {
+    Simulation base = {0};
+    const size_t count = study->parameters.count;
+    Status status = calibrate_make_base(study, simulation, simulation->scene.duration, &base);
+    if (status == STATUS_OK)
+        status = calibrate_check_end(study, &base, limits, count, 0.5, problem);
+    for (size_t i = 0; i < 2 * count && status == STATUS_OK; i++)
+        status = calibrate_check_end(study, &base, limits, i / 2, (double)(i % 2), problem);
+    simulation_clear(&base);
+    return status;
+}
+
+static Status calibrate_complete(void *request, const Simulation *simulation,
+                                 const SimulationLimits *limits, Problem *problem) {
+    CalibrateStudy *study = request;
+    static const char place[] = "/study/parameters";
+    const StudyAxes *axes = &study->parameters;
+    Status status = study_axes_check(axes, false, place, problem);
+    if (axes->count == 0)
+        status =
+            problem_add(problem, STATUS_INVALID, place, "must have at least one parameter to fit");
+    for (size_t i = 0; i < axes->count; i++)
+        if (axes->at[i].values.count > 0)
+            status = json_pointer_fault(problem, json_pointer_at(place, i).at, "values",
+                                        "cannot be fitted: give a range, from and to");
+    status = study_first_failure(status, calibrate_check_measured(study, simulation, problem));
+    TRY(status);
+    TRY(study_axes_find(axes, simulation, place, problem));
+    Simulation scene = {0};
+    status = fields_copy(simulation_fields, simulation, &scene);
+    for (size_t i = 0; i < axes->count && status != STATUS_NO_MEMORY; i++) {
+        bool is_tag = false;
+        const JsonPointer own = json_pointer_at(place, i);
+        const Field *row = study_axis_find(&axes->at[i], &scene, &is_tag, own.at, problem);
+        for (size_t k = 0; row != NULL && k < study_axis_pointer_count(&axes->at[i]); k++)
+            if (calibrate_check_pointer(study_axis_pointer(&axes->at[i], k), row, is_tag, own.at,
+                                        problem) != STATUS_OK)
+                status = STATUS_INVALID;
+    }
+    simulation_clear(&scene);
+    TRY(status);
+    return calibrate_check_ends(study, simulation, limits, problem);
+}
+
+// Runs of the search at the full duration, about.
+static double calibrate_expected(const CalibrateStudy *study) {
+    return (double)study->starts * (50 + 10 * (double)(study->parameters.count + 1)) + 250;
+}
+
+static Status calibrate_cost(const void *request, const Simulation *simulation,
+                             const SimulationLimits *limits, double *steps) {
+    const CalibrateStudy *study = request;
+    Simulation base = {0};
+    (void)limits;
+    const Status status = calibrate_make_base(study, simulation, simulation->scene.duration, &base);
+    if (status == STATUS_OK)
+        *steps = calibrate_expected(study) * simulation_cost(&base).steps;
+    simulation_clear(&base);
+    return status;
+}
+
+static void calibrate_references(void *request, StudyReferences *references) {
+    CalibrateStudy *study = request;
+    *references = (StudyReferences){
+        .axes = &study->parameters, .axes_place = "/study/parameters", .names = &study->names};
+}
+static Status calibrate_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
+                              Problem *problem) {
+    const CalibrateWork *work = of;
+    const StudyAxes *axes = &work->study->parameters;
+    const CalibrateRun *run = &work->runs[member - work->first];
+    StudyValue values[CALIBRATE_PARAMETERS];
+    ((CalibratePart *)(void *)part)->run = run;
+    for (size_t i = 0; i < axes->count; i++)
+        values[i] = (StudyValue){NULL, calibrate_value(&axes->at[i], run->at[i])};
+    return study_scene_make(&work->base, axes, values, &work->study->names, false,
+                            work->work.limits, scene, problem);
+}
+
+static Status calibrate_keep(const void *of, const Outcome *outcome, const StudyTools *tools,
+                             StudyPart *base, Problem *problem) {
+    const CalibrateWork *work = of;
+    CalibratePart *part = (CalibratePart *)(void *)base;
+    const bool has_slope = calibrate_has_shift(work) && part->run->step == 0;
+    FftCache *cache = tools->workspace != NULL ? &tools->workspace->transforms : NULL;
+    part->residual = calloc(work->rows + 1, sizeof(double));
+    part->slope = has_slope ? calloc(work->rows + 1, sizeof(double)) : NULL;
+    TRY(status_made(part->residual != NULL && (part->slope != NULL || !has_slope)));
+    for (size_t c = 0; c < work->study->measured.count; c++) {
+        const MeasuredTarget *target = &work->targets[c];
+        double *residual = part->residual + target->place;
+        double *slope = has_slope ? part->slope + target->place : NULL;
+        TRY(measured_target_model(target, &outcome->response, calibrate_shift(work, part->run->at),
+                                  cache, residual, slope, problem));
+        for (size_t i = 0; i < target->values.count; i++) {
+            residual[i] = (residual[i] - target->values.at[i]) / target->deviation;
+            if (has_slope)
+                slope[i] *= 2 * work->study->max_shift / target->deviation;
+        }
+    }
+    return STATUS_OK;
+}
+
+static void calibrate_clear_part(StudyPart *base) {
+    CalibratePart *part = (CalibratePart *)(void *)base;
+    free(part->residual);
+    free(part->slope);
+}
+static Status calibrate_fold(void *of, size_t member, StudyPart *part) {
+    CalibrateWork *work = of;
+    Calibration *answer = work->answer;
+    const RunRecord *run = &part->run;
+    answer->runs++;
+    if (run->status != STATUS_OK) {
+        answer->failed++;
+        TRY(study_failures_add(&answer->failures, (int)run->status, status_slug(run->status),
+                               member, run->why));
+    }
+    return calibrate_search_fold(work, member, (CalibratePart *)(void *)part);
+}
+static Status calibrate_begin(void *of, const StudyTools *tools, Problem *problem) {
+    CalibrateWork *work = of;
+    (void)tools;
+    (void)problem;
+    work->study = work->work.study;
+    work->answer = work->work.answer;
+    return calibrate_search_begin(work);
+}
+
+static Status calibrate_end(void *of, const StudyTools *tools, Problem *problem) {
+    (void)tools;
+    (void)problem;
+    return calibrate_report(of);
+}
+
+static void calibrate_free(void *of) {
+    calibrate_search_free(of);
+}
+
+const StudyKind study_calibrate = {
+    .kind = {"calibrate", "parameters of the scene fitted to measured motions",
+             calibrate_study_fields, sizeof(CalibrateStudy)},
+    .answer = &(const Kind){"calibrate", "fitted parameters and their uncertainty",
+                            calibration_fields, sizeof(Calibration)},
+    .shorten = "ask for fewer starts or parameters, or a shorter record",
+    .document = "calibration",
+    .references = calibrate_references,
+    .max_runs = 1000,
+    .complete = calibrate_complete,
+    .cost = calibrate_cost,
+    .work_size = sizeof(CalibrateWork),
+    .part_size = sizeof(CalibratePart),
+    .begin = calibrate_begin,
+    .scene = calibrate_scene,
+    .keep = calibrate_keep,
+    .fold = calibrate_fold,
+    .end = calibrate_end,
+    .clear = calibrate_clear_part,
+    .free = calibrate_free,
+};
