@@ -178,6 +178,7 @@ part_bench() {
     sized '1 5' '1 500' build/tests/bench_cost
     sized '200 2 1' '' build/tests/bench_sweep
     sized '/tmp 0.2 jobs' /tmp build/tests/bench_intake
+    sized '2 1000' '' build/tests/bench_optimize
     # Its peers; nothing else needs them.
     check server/packages.sh <(printf '%s\n' nginx-light wrk)
     sized 'cached' '' "$python" tests/bench/service.py --build build

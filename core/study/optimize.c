@@ -135,6 +135,7 @@ static const Field optimum_answer_fields[] = {
     FIELD_COUNT(Optimum, candidates, NULL, AT_MIN(0), 0, "candidates evaluated"),
     FIELD_COUNT(Optimum, runs, NULL, AT_MIN(0), 0, "runs made"),
     FIELD_COUNT(Optimum, failed, NULL, AT_MIN(0), 0, "runs that failed; their candidates are infeasible"),
+    FIELD_LIST(Optimum, objectives, optimize_objective_fields, 0, PRESENCE_DEFAULT, "as requested, in the order of the candidates' values"),
     FIELD_ITEM_OR_NULL(Optimum, best, optimum_best_fields, PRESENCE_OPTIONAL, "the best feasible candidate, of two objectives the best compromise; null: none is feasible"),
     FIELD_ITEM(Optimum, given, optimum_scene_fields, NULL, PRESENCE_DEFAULT, "the scene as it is"),
     FIELD_ITEM(Optimum, undamped, optimum_scene_fields, NULL, PRESENCE_DEFAULT, "the same scene without its dampers"),
@@ -586,6 +587,11 @@ static Status optimize_begin(void *of, const StudyTools *tools, Problem *problem
                          .seed = study->search_seed};
     (void)tools;
     work->answer = work->work.answer;
+    for (size_t i = 0; i < study->objectives.count; i++) {
+        OptimizeObjective *objective = list_append(&work->answer->objectives, sizeof *objective);
+        TRY(status_made(objective != NULL));
+        *objective = study->objectives.at[i];
+    }
     work->runs = optimize_runs(study);
     work->pending = 1 + (PENDING_RUNS - 1) / work->runs;
     work->aggregate =
@@ -632,6 +638,8 @@ static Status optimum_put_candidate(const OptimizeWork *work, size_t candidate,
     row->index = candidate;
     row->feasible = search_violation(work->search, candidate) == 0;
     TRY(optimum_put_values(work, candidate, &row->values));
+    if (search_violation(work->search, candidate) == (double)INFINITY)
+        return STATUS_OK;
     for (size_t i = 0; i < work->study->objectives.count; i++)
         TRY(study_add_real(work->metrics[candidate].of[work->study->objectives.at[i].metric],
                            &row->objectives));
@@ -640,6 +648,11 @@ static Status optimum_put_candidate(const OptimizeWork *work, size_t candidate,
 
 static const double *optimum_runs(const OptimizeWork *work, size_t candidate) {
     return work->objectives + candidate * work->runs * work->study->objectives.count;
+}
+
+// None where it is unknown.
+static Status optimum_put_interval(const double interval[2], Reals *target) {
+    return isnan(interval[0]) ? STATUS_OK : study_copy_reals(interval, 2, target);
 }
 
 static Status optimum_put_best(const OptimizeWork *work, size_t candidate, double *column) {
@@ -656,7 +669,7 @@ static Status optimum_put_best(const OptimizeWork *work, size_t candidate, doubl
         run_aggregate_interval(&work->aggregate, column, work->runs, interval);
         objective->metric = work->study->objectives.at[i].metric;
         objective->value = best->metrics.of[objective->metric];
-        TRY(study_copy_reals(interval, 2, &objective->interval_95));
+        TRY(optimum_put_interval(interval, &objective->interval_95));
     }
     return optimum_put_values(work, candidate, &best->values);
 }
@@ -696,7 +709,7 @@ static Status optimum_put_rival(const OptimizeWork *work, size_t best, size_t ca
         column[run] = optimum_runs(work, candidate)[run] - optimum_runs(work, best)[run];
     if (!work->aggregate.is_max && isnan(work->aggregate.quantile))
         run_aggregate_interval(&mean, column, work->runs, interval);
-    return study_copy_reals(interval, 2, &rival->interval_95);
+    return optimum_put_interval(interval, &rival->interval_95);
 }
 
 // The best candidates in turn whose distance from the best and from each other is large enough.
@@ -879,12 +892,15 @@ static Status optimize_cost(const void *request, const Simulation *simulation,
     return status;
 }
 
-Status optimum_values(const Optimum *optimum, const OptimizeStudy *study, StudyValue *values,
-                      Problem *problem) {
-    if (optimum->best.values.count != study->variables.count)
-        return problem_set(problem, STATUS_NOT_FOUND, "no candidate keeps the constraints");
+static Status optimize_solution(const void *request, const Variant *answer,
+                                struct StudyValue *values, Problem *problem) {
+    const OptimizeStudy *study = request;
+    const OptimumBest *best = &((const Optimum *)(const void *)answer)->best;
+    if (best->values.count != study->variables.count)
+        return problem_set(problem, STATUS_NOT_FOUND,
+                           "no candidate keeps the constraints: there is no best scene");
     for (size_t j = 0; j < study->variables.count; j++)
-        values[j] = (StudyValue){optimum->best.values.at[j].value, (double)NAN};
+        values[j] = (StudyValue){best->values.at[j].value, (double)NAN};
     return STATUS_OK;
 }
 
@@ -905,5 +921,6 @@ const StudyKind study_optimize = {
     .scene = optimize_scene,
     .fold = optimize_fold,
     .end = optimize_end,
+    .solution = optimize_solution,
     .free = optimize_free,
 };

@@ -67,7 +67,7 @@ typedef struct OptimumValues {
 typedef struct OptimumObjective {
     int metric;
     double value;
-    Reals interval_95; // of the statistic over all possible seeds
+    Reals interval_95; // of the statistic over all possible seeds; none: unknown
 } OptimumObjective;
 
 typedef struct OptimumObjectives {
@@ -113,7 +113,7 @@ typedef struct OptimumRivals {
 typedef struct OptimumCandidate {
     uint64_t index;
     OptimumValues values;
-    Reals objectives; // NAN: unknown
+    Reals objectives; // none: it has failed
     bool feasible;
 } OptimumCandidate;
 
@@ -128,7 +128,8 @@ typedef struct Optimum {
     Variant variant;
     uint64_t candidates; // evaluated
     uint64_t runs, failed;
-    OptimumBest best; // values empty: there is no feasible candidate
+    OptimizeObjectives objectives; // as requested
+    OptimumBest best;              // values empty: there is no feasible candidate
     OptimumScene given, undamped;
     OptimumRegion region;
     OptimumRivals rivals;
@@ -137,10 +138,5 @@ typedef struct Optimum {
     StudyFailures failures;
     Warnings warnings;
 } Optimum;
-
-// The values of the best candidate as those of the request's variables, borrowed from the answer;
-// study_scene_make makes its scene of them. STATUS_NOT_FOUND where there is none.
-Status optimum_values(const Optimum *optimum, const OptimizeStudy *study, StudyValue *values,
-                      Problem *problem);
 
 #endif

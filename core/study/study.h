@@ -130,7 +130,8 @@ typedef struct StudyPart {
 
 #define STUDY_BEGUN 0.1 // progress of the study when its first member is made
 
-struct StudyReferences; // axis.h
+struct StudyReferences; // axis.h, as the next
+struct StudyValue;
 
 struct StudyKind {
     Kind kind;
@@ -165,6 +166,10 @@ struct StudyKind {
     Status (*fold)(void *work, size_t member, StudyPart *part);
     // Completes the answer when all wanted members are folded. May be NULL.
     Status (*end)(void *work, const StudyTools *tools, Problem *problem);
+    // The values that the answer found for the axes of the references, borrowed from it; NULL: it
+    // finds none. STATUS_NOT_FOUND.
+    Status (*solution)(const void *study, const Variant *answer, struct StudyValue *values,
+                       Problem *problem);
     void (*clear)(StudyPart *part); // what a part owns beside its StudyPart; may be NULL
     void (*free)(void *work);       // what the work owns; may be NULL
 };

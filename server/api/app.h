@@ -37,13 +37,15 @@ bool jobs_are_light(const Request *request); // planned in some ten microseconds
 Handler jobs_create, jobs_list, jobs_show, jobs_change, jobs_dismiss, jobs_retry, jobs_scene,
     jobs_events;
 Handler results_again, results_delete, results_show, results_manifest, results_part, results_force,
-    results_bundle, results_study, sweeps_table, sweeps_point, calibrations_propose;
+    results_bundle, results_study, results_solution, sweeps_table, sweeps_point,
+    calibrations_propose;
 Handler cache_show, cache_explain, previews_create, compare_results, compare_measured;
 Handler materials_list, materials_show, materials_export, materials_import, materials_create,
     materials_revise, materials_revert, materials_review, materials_revisions, materials_history,
     materials_diff, materials_uses;
 Handler measurements_list, measurements_create, measurements_show, proposals_show, derived_show;
-Handler records_create, records_list, records_show, records_samples, records_spectrum, records_delete;
+Handler records_create, records_list, records_show, records_samples, records_spectrum,
+    records_delete;
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
 Handler short_ids_redirect; // of no route: Router.not_found

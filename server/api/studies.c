@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/study/axis.h"
 #include "server/api/app.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/sweep.h"
@@ -37,10 +38,10 @@ static Status study_format(const Request *request, const StudyFormat *offered, R
     return STATUS_OK;
 }
 
-// The path ends with the name of the kind's document.
+// The name of the kind's document follows the result in the path.
 static const StudyKind *study_of_route(const Request *request) {
-    const char *name = strrchr(request->route->pattern, '/') + 1;
-    const size_t length = strcspn(name, ".");
+    const char *name = strstr(request->route->pattern, "{id}/") + 5;
+    const size_t length = strcspn(name, "./");
     size_t i = 0;
     while (strncmp(study_document_name(studies[i]), name, length) != 0 ||
            study_document_name(studies[i])[length] != '\0')
@@ -68,6 +69,48 @@ Status results_study(App *app, const Request *request, Reply *reply, Problem *pr
     }
     fields_clear(study_answer_fields, &answer);
     bytes_clear(&bytes);
+    result_row_clear(&row);
+    return status;
+}
+
+// The scene of the request with the values that its study found.
+static Status study_make_solution(const StudyRequest *request, const Variant *answer,
+                                  Simulation *scene, Problem *problem) {
+    const StudyKind *kind = study_kind(request->study);
+    StudyReferences references = {.axes = NULL};
+    StudyValue values[STUDY_AXES];
+    kind->references(request->study, &references);
+    TRY(kind->solution(request->study, answer, values, problem));
+    TRY(study_scene_make(&request->simulation, references.axes, values, references.names, false,
+                         NULL, scene, problem));
+    scene->output.reduction = request->simulation.output.reduction;
+    return STATUS_OK;
+}
+
+Status results_solution(App *app, const Request *request, Reply *reply, Problem *problem) {
+    ResultRow row = {0};
+    StudyAnswer answer = {NULL};
+    StudyRequest given = {.study = NULL}, found = {.study = NULL};
+    Warnings warnings = {NULL, 0};
+    Bytes bytes = {.most = app->reply_most};
+    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
+    if (status == STATUS_OK)
+        status = study_read_kind(&row, study_of_route(request), &answer, problem);
+    if (status == STATUS_OK)
+        status =
+            jobs_prepare(app->db, row.scene, strlen(row.scene), NULL, &given, &warnings, problem);
+    if (status == STATUS_OK)
+        status = study_make_solution(&given, answer.study, &found.simulation, problem);
+    if (status == STATUS_OK) {
+        document_scene(&bytes, &found);
+        bytes_text(&bytes, "\n");
+        status = reply_bytes(reply, 200, type_json, &bytes, problem);
+    }
+    bytes_clear(&bytes);
+    warnings_clear(&warnings);
+    study_request_clear(&given);
+    study_request_clear(&found);
+    fields_clear(study_answer_fields, &answer);
     result_row_clear(&row);
     return status;
 }

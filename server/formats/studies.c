@@ -195,6 +195,12 @@ static const struct {
      {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, NULL},
       {"svg", chart_type, false, chart_calibration}}},
+    {&study_optimize,
+     table_optimum,
+     {{"json", "application/json", false, NULL},
+      {"csv", csv_type, false, NULL},
+      {"npz", "application/x-npz", true, NULL},
+      {"svg", chart_type, false, chart_optimum}}},
     {NULL, NULL, {{"json", "application/json", false, NULL}}}, // of any other
 };
 

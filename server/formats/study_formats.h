@@ -96,6 +96,9 @@ void chart_fragility(const Variant *answer, Bytes *bytes);
 // Measured and fitted motions and their difference; and a row for each parameter.
 void chart_calibration(const Variant *answer, Bytes *bytes);
 void calibration_table(const Variant *answer, StudyTable *table);
+// The candidates with the best so far, or of two objectives with the front.
+void chart_optimum(const Variant *answer, Bytes *bytes);
+void table_optimum(const Variant *answer, StudyTable *table);
 // Each metric of a sweep: a line over one axis, or a map over two. Size and memory are limited for
 // any number of points. False: the rows could not be read to their end.
 bool chart_sweep(const SweepDocument *document, Bytes *bytes);

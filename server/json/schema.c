@@ -54,6 +54,7 @@ const SchemaDocument schema_documents[] = {
     {"sensitivity", "Answer of the study sensitivity", NULL, &study_sensitivity},
     {"fragility", "Answer of the study fragility", NULL, &study_fragility},
     {"calibrate", "Answer of the study calibrate", NULL, &study_calibrate},
+    {"optimize", "Answer of the study optimize", NULL, &study_optimize},
     {NULL, NULL, NULL, NULL},
 };
 // clang-format on
