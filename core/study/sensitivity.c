@@ -416,6 +416,8 @@ static const Field sensitivity_spectrum_fields[] = {
     FIELD_REALS(RunSpectrum, q05, NULL, ANY, 0, PRESENCE_OPTIONAL, "5 % of the runs are below, at each frequency separately"),
     FIELD_REALS(RunSpectrum, median, NULL, ANY, 0, PRESENCE_OPTIONAL, "half of the runs are below"),
     FIELD_REALS(RunSpectrum, q95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % of the runs are below"),
+    {.name = "q16", .kind = FIELD_KIND_REALS, .offset = FIELD_AT(RunSpectrum, q16, Reals), .size = sizeof(double), .range = ANY, .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN},
+    {.name = "q84", .kind = FIELD_KIND_REALS, .offset = FIELD_AT(RunSpectrum, q84, Reals), .size = sizeof(double), .range = ANY, .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN},
     FIELD_END
 };
 
