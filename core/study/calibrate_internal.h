@@ -9,7 +9,7 @@
 
 enum {
     CALIBRATE_VARIABLES = CALIBRATE_PARAMETERS + 1, // and the shift
-    CALIBRATE_WINDOWS = 7, // of the record, each longer than the one before
+    CALIBRATE_WINDOWS = 16, // of the record, each longer than the one before
     CALIBRATE_SAMPLES_MIN = 16,
     CALIBRATE_KEPT = 3, // starts of the result of a window
 };

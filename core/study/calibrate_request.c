@@ -113,6 +113,9 @@ static Status calibrate_check_measured(const CalibrateStudy *study, const Simula
         const double from = fmax(measured->start, study->max_shift);
         const double to = fmin(end, duration - study->max_shift);
         samples += measured->samples.count;
+        if (strcmp(measured->channel, CHANNEL_USUAL) == 0)
+            status = json_pointer_fault(problem, place.at, "channel",
+                                        "must name one channel, as displacement");
         if (end > duration * (1 + 1e-9))
             status = json_pointer_fault(problem, place.at, "samples",
                                         "end at %s s, the scene ends at %s s: give the scene a "

@@ -24,7 +24,7 @@ enum {
     VARIABLES = CALIBRATE_VARIABLES,
     WINDOWS = CALIBRATE_WINDOWS,
     KEPT_MIN = CALIBRATE_KEPT,
-    SAMPLES_MIN = CALIBRATE_SAMPLES_MIN,
+    WINDOW_SAMPLES = 64, // at least, in the first window
     SCREENED_FIRST = 32, // points for each start in the first window
     SCREENED = 16,       // and in later ones
     STEPS_FIRST = 15,    // of a start in a window, tried
@@ -47,8 +47,9 @@ static const double sensitive = 2.5, rough = 4;
 static const double difference_share = 0.5; // of the deviation of one parameter alone
 static const double difference_first = 1e-5, difference_min = 1e-9, difference_max = 1e-4,
                     difference_chaos = 5e-2;
-static const double difference_change = 3; // factor above which derivatives are made again
-static const double one_sided = 4;         // ratio of squares
+static const double correlation_max = 0.95; // of derivatives that are mostly noise
+static const double difference_change = 3;  // factor above which derivatives are made again
+static const double one_sided = 4;          // ratio of squares
 static const double damping_first = 1e-3, damping_max = 1e12;
 // A decrease below this part of the variance of the noise ends a fit.
 static const double tolerance_first = 1e-2, tolerance_last = 1e-4;
@@ -356,6 +357,13 @@ static void calibrate_remove_noise(const CalibrateWork *work, CalibrateStart *st
         double *square = &start->equations.matrix[i * (n + 1)];
         *square = fmax(*square - noise, 1e-3 * noise);
     }
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < n; k++) {
+            double *matrix = start->equations.matrix;
+            const double max = correlation_max * sqrt(matrix[i * (n + 1)] * matrix[k * (n + 1)]);
+            if (i != k)
+                matrix[i * n + k] = fmin(fmax(matrix[i * n + k], -max), max);
+        }
 }
 
 // Of the best point each column is made twice, on both sides. A difference is much larger than that
@@ -770,7 +778,8 @@ static void calibrate_make_windows(CalibrateWork *work) {
     }
     for (int k = WINDOWS - 1; k >= 0; k--) {
         const double share = pow(window_growth, -k);
-        const bool is_short = share * (double)samples < (double)(SAMPLES_MIN + 4 * work->variables);
+        const bool is_short =
+            share * (double)samples < (double)(WINDOW_SAMPLES + 4 * work->variables);
         if (k == 0 || (work->fit == CALIBRATE_TIME && !is_short))
             work->ends[work->windows++] =
                 k == 0 ? to : fmax(from + share * (to - from), from + 2 * work->study->max_shift);

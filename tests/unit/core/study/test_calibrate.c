@@ -28,7 +28,7 @@ static void parameter_add(StudyRequest *request, const char *pointer, double fro
 // The displacement of a scene with noise of this part of its rms, every 5 ms.
 static MeasuredChannel *measure(StudyRequest *request, const Simulation *scene, double noise) {
     Simulation made;
-    Outcome *outcome;
+    Outcome *outcome = NULL;
     assert_int_equal(fields_copy(simulation_fields, scene, &made), STATUS_OK);
     made.scene.sample_rate = 200;
     problem_clear(&problem);
@@ -200,6 +200,11 @@ TEST(what_cannot_be_fitted_is_refused) {
     study_of(&request)->measured.at[0].channel = strdup("displacemen");
     parameter_add(&request, "/structure/stiffness", 700, 1000);
     assert_refused(&request, "/study/measured/0/channel", "");
+    request = request_make();
+    free(measure(&request, &request.simulation, 0.02)->channel);
+    study_of(&request)->measured.at[0].channel = strdup("usual");
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    assert_refused(&request, "/study/measured/0/channel", "one channel");
     request = request_make();
     measure(&request, &request.simulation, 0.02)->start = 1;
     parameter_add(&request, "/structure/stiffness", 700, 1000);
