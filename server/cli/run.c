@@ -647,6 +647,7 @@ const Command command_ensemble = {
 static const Field sweep_fields[] = {
     OUTPUT_ROW(".json, .csv, .npy, .npz or .mat the table or .svg the chart"),
     JSON_ROW,
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -705,4 +706,138 @@ const Command command_sweep = {
     .run = study_command_run,
     .study = &(const StudyCommand){&study_sweep, NULL, sweep_add},
     .view = &sweep_view,
+};
+
+// Of the studies whose request is all in the scene.
+static const Field design_fields[] = {
+    OUTPUT_ROW(".json the whole, .csv or .npz the table or .svg the chart"),
+    JSON_ROW,
+    RECORD_ROWS(StudySettings),
+    CPU_ROW(StudySettings),
+    FIELD_END,
+};
+
+static const PrintTableView optimize_view = {
+    .skipped = (const char *const[]){"kind", "history", NULL},
+    .lists = (const PrintTableColumns[]){{"values", {"pointer", "value"}},
+                                         {"objectives", {"metric", "value", "interval_95"}},
+                                         {"rivals", {"difference", "interval_95", "values"}},
+                                         {NULL, {NULL}}},
+};
+
+const Command command_optimize = {
+    .name = "optimize",
+    .operands = "SCENE.json",
+    .summary = "values of members of a scene that make a metric best, under constraints",
+    .help = "  impactd optimize scene.json                     the best values, and rivals\n"
+            "  impactd optimize scene.json -o out.svg          the chart of the search\n"
+            "  impactd optimize scene.json -o out.csv          every candidate\n"
+            "  impactd optimize scene.json --json              the whole answer\n"
+            "\n"
+            "The scene says what varies and what is best:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"optimize\", \"objectives\": [{\"metric\": "
+            "\"rms_displacement\"}],\n"
+            "    \"variables\": [{\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, \"to\": "
+            "0.03}],\n"
+            "    \"over\": {\"runs\": 64}}\n"
+            "\n"
+            "Each candidate is run over the same seeds or records. Exit code 3 if the scene\n"
+            "has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_optimize, NULL, NULL},
+    .view = &optimize_view,
+};
+
+static const PrintTableView calibrate_view = {
+    .skipped = (const char *const[]){"kind", "history", "motions", NULL},
+    .lists = (const PrintTableColumns[]){
+        {"parameters",
+         {"pointer", "value", "unit", "standard_error", "interval_95", "identifiable"}},
+        {NULL, {NULL}}}};
+
+const Command command_calibrate = {
+    .name = "calibrate",
+    .operands = "SCENE.json",
+    .summary = "fit parameters of a scene to measured motions",
+    .help = "  impactd calibrate scene.json                    parameters with their intervals\n"
+            "  impactd calibrate scene.json -o out.svg         measured and fitted motions\n"
+            "  impactd calibrate scene.json --json             the whole answer\n"
+            "\n"
+            "The scene holds the measurement:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"calibrate\",\n"
+            "    \"parameters\": [{\"pointer\": \"/dampers/0/buffer/restitution\", \"from\": 0.3, "
+            "\"to\": 0.9}],\n"
+            "    \"measured\": [{\"channel\": \"displacement\", \"interval\": 0.01, \"samples\": "
+            "[...]}]}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_calibrate, NULL, NULL},
+    .view = &calibrate_view,
+};
+
+static const PrintTableView response_view = {
+    .skipped = (const char *const[]){"kind", "multipliers", "section", NULL},
+    .lists = (const PrintTableColumns[]){
+        {"points",
+         {"value", "direction", "branch", "period", "impacts_per_period", "stable",
+          "peak_displacement", "undamped_peak_displacement", "lyapunov"}},
+        {NULL, {NULL}}}};
+
+const Command command_response = {
+    .name = "response",
+    .operands = "SCENE.json",
+    .summary = "steady motion under a sine while a number varies: periodic orbits, stability",
+    .help = "  impactd response scene.json                     the curve as a table\n"
+            "  impactd response scene.json -o out.svg          the chart\n"
+            "  impactd response scene.json -o out.csv          the table as a file\n"
+            "\n"
+            "The scene has a sine, and says what varies:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"response\", \"direction\": \"both\", \"axis\":\n"
+            "    {\"pointer\": \"/excitation/frequency\", \"from\": 3, \"to\": 5, \"count\": 81}}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_response, NULL, NULL},
+    .view = &response_view,
+};
+
+static const PrintTableView fragility_view = {
+    .skipped = (const char *const[]){"kind", "curves", NULL},
+    .lists =
+        (const PrintTableColumns[]){{"limits",
+                                     {"metric", "value", "exceeded", "median", "median_interval_95",
+                                      "dispersion", "dispersion_interval_95"}},
+                                    {NULL, {NULL}}}};
+
+const Command command_fragility = {
+    .name = "fragility",
+    .operands = "SCENE.json",
+    .summary = "probability of exceeding limits under ground motions of rising intensity",
+    .help = "  impactd fragility scene.json --record a.AT2 --record b.AT2\n"
+            "  impactd fragility scene.json --record a.AT2 --record b.AT2 -o out.svg\n"
+            "\n"
+            "The scene names the ground motions by the names of the files:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"fragility\", \"records\": [\"a\", \"b\"], \"intensity\": "
+            "\"pga\",\n"
+            "    \"levels\": {\"from\": 0.5, \"to\": 10, \"count\": 20},\n"
+            "    \"limits\": [{\"metric\": \"peak_displacement\", \"value\": 0.02}]}\n"
+            "\n"
+            "A server has them by name (impactd records add, impactd submit). Exit code 3 if\n"
+            "the scene has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_fragility, NULL, NULL},
+    .view = &fragility_view,
 };
