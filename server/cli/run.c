@@ -570,9 +570,11 @@ static const Field ensemble_fields[] = {
                 "seed of the first (the scene's own)"),
     FIELD_REAL(StudySettings, target, NULL, ANY, OPTIONAL,
                "relative error wanted of the metric's mean: no more runs than keep it"),
-    FIELD_CHOICE(StudySettings, metric, statistics_metric_names, OPTIONAL,
-                 "peak_displacement, rms_displacement (usual), peak_acceleration, "
-                 "rms_acceleration, impacts, peak_contact_force or psd"),
+    FIELD_CHOICE(
+        StudySettings, metric, statistics_metric_names, OPTIONAL,
+        "peak_displacement, rms_displacement (usual), peak_acceleration, "
+        "rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear "
+        "or psd"),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
