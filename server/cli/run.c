@@ -37,14 +37,16 @@ static void warnings_print(const char *path, const Warnings *warnings) {
 }
 
 // Reads and resolves a scene and prints its warnings. Both outputs are cleared in any case.
-static Status scene_prepare(const char *path, const Bytes *text, const SimulationLimits *limits,
-                            StudyRequest *request, Warnings *warnings, Problem *problem) {
+static Status scene_prepare(const char *path, const Bytes *text, const RecordFiles *records,
+                            const SimulationLimits *limits, StudyRequest *request,
+                            Warnings *warnings, Problem *problem) {
     Db *db = NULL;
     *request = (StudyRequest){0};
     *warnings = (Warnings){0};
     TRY(db_open(NULL, &db, problem));
-    const Status status =
-        jobs_prepare(db, text->at, text->count, limits, request, warnings, problem);
+    Status status = record_files_add(db, records, problem);
+    if (status == STATUS_OK)
+        status = jobs_prepare(db, text->at, text->count, limits, request, warnings, problem);
     db_close(db);
     if (status == STATUS_OK)
         warnings_print(path, warnings);
@@ -53,6 +55,8 @@ static Status scene_prepare(const char *path, const Bytes *text, const Simulatio
 
 typedef struct RunSettings {
     char *output;
+    Texts record;
+    int unit;
     double max_cpu_seconds;
     const TableFormat *format; // of the output's extension; NULL without output
 } RunSettings;
@@ -60,6 +64,7 @@ typedef struct RunSettings {
 static const Field run_fields[] = {
     FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
                "write to this file; its extension says what"),
+    RECORD_ROWS(RunSettings),
     CPU_ROW(RunSettings),
     FIELD_END,
 };
@@ -177,7 +182,8 @@ static Status run_scene(const char *path, const Bytes *text, void *of, Problem *
     const SimulationLimits limits = scene_limits(settings->max_cpu_seconds);
     StudyRequest request;
     Warnings warnings;
-    Status status = scene_prepare(path, text, &limits, &request, &warnings, problem);
+    Status status = scene_prepare(path, text, &(RecordFiles){settings->record, settings->unit},
+                                  &limits, &request, &warnings, problem);
     if (status == STATUS_OK && request.study != NULL)
         status =
             problem_add(problem, STATUS_INVALID, "/study",
@@ -237,12 +243,15 @@ const Command command_run = {
 
 typedef struct CheckSettings {
     bool json;
+    Texts record;
+    int unit;
     double max_cpu_seconds;
 } CheckSettings;
 
 static const Field check_fields[] = {
     FIELD_FLAG(CheckSettings, json, false,
                "print the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
+    RECORD_ROWS(CheckSettings),
     CPU_ROW(CheckSettings),
     FIELD_END,
 };
@@ -275,7 +284,9 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
     DryRun run = {0};
     Bytes bytes = {0};
     TRY(db_open(NULL, &db, problem));
-    Status status = jobs_open(db, &settings, &manager, problem);
+    Status status = record_files_add(db, &(RecordFiles){asked->record, asked->unit}, problem);
+    if (status == STATUS_OK)
+        status = jobs_open(db, &settings, &manager, problem);
     if (status == STATUS_OK)
         status = jobs_dry_run(manager, text->at, text->count, &run, problem);
     if (status == STATUS_OK)
@@ -315,6 +326,8 @@ const Command command_check = {
 typedef struct StudySettings {
     const Command *command;
     Texts output;
+    Texts record;
+    int unit;
     bool json;
     double max_cpu_seconds;
     int metric; // of the study's own names; CHOICE_ABSENT
@@ -444,7 +457,8 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     const Texts *outputs = &settings->output;
     StudyRequest request;
     Warnings warnings;
-    Status status = scene_prepare(path, text, &limits, &request, &warnings, problem);
+    Status status = scene_prepare(path, text, &(RecordFiles){settings->record, settings->unit},
+                                  &limits, &request, &warnings, problem);
     if (status == STATUS_OK)
         status = study_choose(&request, settings, problem);
     if (status == STATUS_OK)
@@ -470,6 +484,7 @@ static int study_command_run(const Command *self, void *of, const Options *optio
 static const Field study_fields[] = {
     OUTPUT_ROW(".json the whole or .csv the table or .svg the chart, where the study has them"),
     JSON_ROW,
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -505,6 +520,7 @@ static const Field tradeoff_fields[] = {
                 "try this solver only; may be given again"),
     FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL,
                "solver steps a point may be predicted to take (5e7)"),
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -575,6 +591,7 @@ static const Field ensemble_fields[] = {
         "peak_displacement, rms_displacement (usual), peak_acceleration, "
         "rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear "
         "or psd"),
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
