@@ -126,9 +126,9 @@ static const Field ensemble_index_fields[] = {
     FIELD_CHOICE(EnsembleIndex, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
     FIELD_COUNT(EnsembleIndex, samples, NULL, AT_MIN(0), 0, "base samples whose runs all ended"),
     FIELD_REAL(EnsembleIndex, first, NULL, ANY, OPTIONAL, "part of the metric's variance that this input causes alone"),
-    FIELD_REALS(EnsembleIndex, first_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval; estimates may be below 0 or above 1"),
+    FIELD_REALS_OR_NULL(EnsembleIndex, first_interval_95, NULL, "its 95 % confidence interval; estimates may be below 0 or above 1"),
     FIELD_REAL(EnsembleIndex, total, NULL, ANY, OPTIONAL, "part that it causes alone and with others"),
-    FIELD_REALS(EnsembleIndex, total_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval"),
+    FIELD_REALS_OR_NULL(EnsembleIndex, total_interval_95, NULL, "its 95 % confidence interval"),
     FIELD_END
 };
 

@@ -771,7 +771,7 @@ const Command command_optimize = {
 };
 
 static const PrintTableView calibrate_view = {
-    .skipped = (const char *const[]){"kind", "history", "motions", NULL},
+    .skipped = (const char *const[]){"kind", "history", "motions", "correlation", NULL},
     .lists = (const PrintTableColumns[]){
         {"parameters",
          {"pointer", "value", "unit", "standard_error", "interval_95", "identifiable"}},
