@@ -33,7 +33,7 @@ const Field calibrated_parameter_fields[] = {
     FIELD_TEXT(CalibratedParameter, unit, 0, PRESENCE_OPTIONAL, 0, "of its value"),
     FIELD_REAL(CalibratedParameter, value, NULL, ANY, OPTIONAL, "fitted"),
     FIELD_REAL(CalibratedParameter, standard_error, NULL, ANY, OPTIONAL, "standard deviation of the fitted value; unknown if it is not identifiable"),
-    FIELD_REALS_OR_NULL(CalibratedParameter, interval_95, NULL, "95 % confidence interval"),
+    FIELD_REALS(CalibratedParameter, interval_95, NULL, ANY, 0, PRESENCE_OPTIONAL, "95 % confidence interval"),
     {.name = "identifiable", .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(CalibratedParameter, is_identifiable, bool), .presence = PRESENCE_DEFAULT, .doc = "the measured motions determine it within its range"},
     FIELD_END
 };
@@ -343,6 +343,19 @@ static void calibrate_free(void *of) {
     calibrate_search_free(of);
 }
 
+static Status calibrate_solution(const void *request, const Variant *answer, StudyValue *values,
+                                 Problem *problem) {
+    const CalibrateStudy *study = request;
+    const Calibration *calibration = (const Calibration *)(const void *)answer;
+    for (size_t i = 0; i < study->parameters.count; i++) {
+        values[i] = (StudyValue){NULL, calibration->parameters.at[i].value};
+        if (isnan(values[i].number))
+            return problem_set(problem, STATUS_NOT_FOUND, "there are no fitted values: %s",
+                               calibration->detail);
+    }
+    return STATUS_OK;
+}
+
 const StudyKind study_calibrate = {
     .kind = {"calibrate", "parameters of the scene fitted to measured motions",
              calibrate_study_fields, sizeof(CalibrateStudy)},
@@ -361,6 +374,7 @@ const StudyKind study_calibrate = {
     .keep = calibrate_keep,
     .fold = calibrate_fold,
     .end = calibrate_end,
+    .solution = calibrate_solution,
     .clear = calibrate_clear_part,
     .free = calibrate_free,
 };

@@ -26,6 +26,10 @@ def test_a_calibration_becomes_a_revision_of_a_material():
         assert len(rows) == 3 and rows[1].startswith("/dampers/0/buffer/restitution,1,0.6"), rows
         chart = daemon.get(f"/v1/results/{result}/calibration.svg").body
         assert xml.etree.ElementTree.fromstring(chart).tag.endswith("svg") and b"measured" in chart
+        fitted = daemon.get(f"/v1/results/{result}/calibration/scene").json()
+        assert fitted["dampers"][0]["buffer"] == {"restitution": answer["parameters"][0]["value"],
+                                                  "contact_time": answer["parameters"][1]["value"]}, fitted
+        assert program.finished(daemon, fitted)["status"] == "successful"
         asked = daemon.request("POST", f"/v1/results/{result}/calibration/proposal?material=sponge")
         proposal = asked.json()
         assert proposal["why"] is None and proposal["revision"]["restitution"] == answer["parameters"][0]["value"]

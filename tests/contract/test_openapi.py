@@ -133,14 +133,14 @@ def test_real_answers_have_the_promised_shapes():
         swept = program.finished(daemon, program.scene("sweep_frequency"))
         sweep = {"id": swept["result"], "index": "7"}
         studies = {}
-        for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity"), ("response_sponge", "response"),
+        for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity"),
                            ("calibrate_free_sponge", "calibration")):
             studies[kind] = {"id": program.finished(daemon, program.scene(name))["result"]}
         best = {**program.scene("paper_free_sponge"), "duration": 1, "study": {
             "kind": "optimize", "variables": [{"pointer": "/dampers/0/mass", "from": 0.05, "to": 0.2}],
             "objectives": [{"metric": "rms_displacement"}], "max_candidates": 8}}
         studies["optimum"] = {"id": program.finished(daemon, best)["result"]}
-        values = {"/v1/results/{id}/optimum/scene": studies["optimum"], "/v1/results/{id}/table.{format}": sweep, "/v1/results/{id}/table": sweep,
+        values = {"/v1/results/{id}/optimum/scene": studies["optimum"], "/v1/results/{id}/calibration/scene": studies["calibration"], "/v1/results/{id}/table.{format}": sweep, "/v1/results/{id}/table": sweep,
                   "/v1/results/{id}/points/{index}": sweep, "/v1/results/{id}/points/{index}/scene": sweep,
                   "/v1/jobs/{id}/table.{format}": {"id": swept["id"]}, "/v1/jobs/{id}/table": {"id": swept["id"]},
                   **{f"/v1/results/{{id}}/{kind}{ending}": value for kind, value in studies.items()

@@ -62,7 +62,7 @@ static StudyRequest request_make(void) {
 }
 
 static Calibration *calibrate(StudyRequest *request) {
-    Variant *answer;
+    Variant *answer = NULL;
     problem_clear(&problem);
     if (study_request_complete(request, NULL, NULL, &problem) != STATUS_OK ||
         study_run(request->study, &request->simulation, &(StudyTools){.limits = NULL}, &answer,
