@@ -120,7 +120,7 @@ enum {
     FIELD_NOTE = 1,
     // ITEM: JSON null is allowed and makes every member absent (fields_clear). TEXT: JSON null is
     // allowed and means "", which is not absent and is written as null. TEXTS: JSON null is allowed
-    // and means an empty list.
+    // and means an empty list. REALS, ROWS: an empty list is written as null.
     FIELD_NULL_IS_EMPTY = 2,
     // TEXTS: a JSON object of strings is also allowed and stored as "key=value".
     FIELD_PAIRS = 4,
@@ -203,6 +203,12 @@ struct Field {
 #define FIELD_REALS(Type, member, unit_, range_, max_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
      .size = sizeof(double), .range = range_, .max = max_, .presence = presence_, .doc = doc_}
+#define FIELD_REALS_OR_NULL(Type, member, unit_, doc_) \
+    {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
+     .size = sizeof(double), .range = ANY, .presence = PRESENCE_OPTIONAL, .flags = FIELD_NULL_IS_EMPTY, .doc = doc_}
+#define FIELD_ROWS_OR_NULL(Type, member, unit_, doc_) \
+    {.name = #member, .kind = FIELD_KIND_ROWS, .offset = FIELD_AT(Type, member, Rows), .unit = unit_, \
+     .size = sizeof(Reals), .range = ANY, .presence = PRESENCE_OPTIONAL, .flags = FIELD_NULL_IS_EMPTY, .doc = doc_}
 #define FIELD_LONE_REALS(Type, member, unit_, range_, max_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
      .size = sizeof(double), .range = range_, .max = max_, .presence = presence_, .flags = FIELD_LONE, .doc = doc_}

@@ -71,6 +71,8 @@ static const Field ensemble_statistics_fields[] = {
     FIELD_ITEM(EnsembleStatistics, rms_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, impacts, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_ITEM(EnsembleStatistics, peak_contact_force, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise; unknown if contacts have no force"),
+    FIELD_ITEM(EnsembleStatistics, peak_storey_drift, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise; unknown if the structure is no frame"),
+    FIELD_ITEM(EnsembleStatistics, peak_base_shear, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
     FIELD_END
 };
 
@@ -124,9 +126,9 @@ static const Field ensemble_index_fields[] = {
     FIELD_CHOICE(EnsembleIndex, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
     FIELD_COUNT(EnsembleIndex, samples, NULL, AT_MIN(0), 0, "base samples whose runs all ended"),
     FIELD_REAL(EnsembleIndex, first, NULL, ANY, OPTIONAL, "part of the metric's variance that this input causes alone"),
-    FIELD_REALS(EnsembleIndex, first_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval; estimates may be below 0 or above 1"),
+    FIELD_REALS_OR_NULL(EnsembleIndex, first_interval_95, NULL, "its 95 % confidence interval; estimates may be below 0 or above 1"),
     FIELD_REAL(EnsembleIndex, total, NULL, ANY, OPTIONAL, "part that it causes alone and with others"),
-    FIELD_REALS(EnsembleIndex, total_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval"),
+    FIELD_REALS_OR_NULL(EnsembleIndex, total_interval_95, NULL, "its 95 % confidence interval"),
     FIELD_END
 };
 
@@ -616,7 +618,7 @@ static Status ensemble_add_indices(const EnsembleWork *work, const StudyTools *t
                                    Problem *problem) {
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         for (size_t i = 0; i < work->indexed && work->values != NULL; i++) {
-            if (metric == STATISTICS_PEAK_CONTACT_FORCE && !work->has_force)
+            if (work->answer->statistics.of[metric].count == 0)
                 continue;
             TRY(study_advance(tools->progress, 1, problem));
             TRY(ensemble_add_index(work, metric, i));

@@ -21,7 +21,7 @@ typedef struct EnsembleStudy {
 typedef union EnsembleStatistics {
     struct {
         RunStatistic peak_displacement, rms_displacement, peak_acceleration, rms_acceleration,
-            impacts, peak_contact_force;
+            impacts, peak_contact_force, peak_storey_drift, peak_base_shear;
     };
     RunStatistic of[STATISTICS_METRICS];
 } EnsembleStatistics;

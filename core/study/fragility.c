@@ -77,9 +77,9 @@ static const Field fragility_state_fields[] = {
     FIELD_REAL(FragilityState, value, NULL, ANY, OPTIONAL, "its limit"),
     FIELD_COUNT(FragilityState, exceeded, NULL, AT_MIN(0), 0, "records that exceed it at some level"),
     FIELD_REAL(FragilityState, median, "m/s^2", ANY, OPTIONAL, "intensity at which half of all ground motions exceed it"),
-    FIELD_REALS(FragilityState, median_interval_95, "m/s^2", ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval"),
+    FIELD_REALS_OR_NULL(FragilityState, median_interval_95, "m/s^2", "its 95 % confidence interval"),
     FIELD_REAL(FragilityState, dispersion, NULL, ANY, OPTIONAL, "standard deviation of the logarithm of that intensity"),
-    FIELD_REALS(FragilityState, dispersion_interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "its 95 % confidence interval"),
+    FIELD_REALS_OR_NULL(FragilityState, dispersion_interval_95, NULL, "its 95 % confidence interval"),
     FIELD_END
 };
 

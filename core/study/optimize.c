@@ -84,7 +84,7 @@ static const Field optimum_value_fields[] = {
 static const Field optimum_objective_fields[] = {
     FIELD_CHOICE(OptimumObjective, metric, study_metric_names, OPTIONAL, "metric"),
     FIELD_REAL(OptimumObjective, value, NULL, ANY, OPTIONAL, "its statistic over the runs"),
-    FIELD_REALS(OptimumObjective, interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "confidence interval of the statistic over all possible seeds or records, of these values: the best of many is a little better by chance"),
+    FIELD_REALS_OR_NULL(OptimumObjective, interval_95, NULL, "confidence interval of the statistic over all possible seeds or records, of these values: the best of many is a little better by chance"),
     FIELD_END
 };
 
@@ -111,7 +111,7 @@ static const Field optimum_interval_fields[] = {
 static const Field optimum_rival_fields[] = {
     FIELD_LIST(OptimumRival, values, optimum_value_fields, 0, PRESENCE_DEFAULT, "of the variables"),
     FIELD_REAL(OptimumRival, difference, NULL, ANY, OPTIONAL, "its first objective less that of the best"),
-    FIELD_REALS(OptimumRival, interval_95, NULL, ANY, 2, PRESENCE_OPTIONAL, "confidence interval of the mean difference, over the runs in pairs: where it contains 0, the two cannot be told apart"),
+    FIELD_REALS_OR_NULL(OptimumRival, interval_95, NULL, "confidence interval of the mean difference, over the runs in pairs: where it contains 0, the two cannot be told apart"),
     FIELD_END
 };
 

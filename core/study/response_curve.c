@@ -56,11 +56,11 @@ const Field response_point_fields[] = {
     FIELD_COUNT(ResponsePoint, period, NULL, AT_MIN(1), OPTIONAL, "in cycles of the sine; null: no periodic orbit found"),
     FIELD_COUNT(ResponsePoint, impacts_per_period, NULL, AT_MIN(0), OPTIONAL, "of all dampers"),
     FIELD_FLAG(ResponsePoint, stable, false, "all multipliers are below 1 in magnitude; false also where one is 1, as of a mass that touches no stop"),
-    FIELD_ROWS(ResponsePoint, multipliers, NULL, ANY, 0, PRESENCE_OPTIONAL, "Floquet multipliers, real and imaginary part, the largest first"),
+    FIELD_ROWS_OR_NULL(ResponsePoint, multipliers, NULL, "Floquet multipliers, real and imaginary part, the largest first"),
     FIELD_REAL(ResponsePoint, peak_displacement, "m", ANY, OPTIONAL, "largest displacement of any storey over the period or the section's cycles, also between events"),
     FIELD_REAL(ResponsePoint, rms_displacement, "m", ANY, OPTIONAL, "root mean square over the same time, the largest of all storeys"),
     FIELD_REAL(ResponsePoint, undamped_peak_displacement, "m", ANY, OPTIONAL, "largest displacement of any storey in the steady state without dampers"),
-    FIELD_ROWS(ResponsePoint, section, NULL, ANY, 0, PRESENCE_OPTIONAL, "displacement and velocity of the top storey at the upward zero crossings of the sine, where no period is found"),
+    FIELD_ROWS_OR_NULL(ResponsePoint, section, NULL, "displacement and velocity of the top storey at the upward zero crossings of the sine, where no period is found"),
     FIELD_REAL(ResponsePoint, lyapunov, "1/s", ANY, OPTIONAL, "largest Lyapunov exponent over the section's cycles, where no period is found; null where contact parameters depend on the approach speed"),
     FIELD_END
 };

@@ -29,6 +29,7 @@ enum {
     PARAMETERS = SEARCH_VARIABLES + 2,  // logarithms of lengths, share and scale of the roughness
     CENTRES = 4,                        // candidates around which others are tried
     FIRST_FITS = 8,
+    ROWS_PER_FIT = 40,
 };
 
 static const double log_length_min = -3.5, log_length_max = 2.5, log_noise_min = -14,
@@ -328,7 +329,7 @@ static void search_fit(Search *search, size_t count) {
     trial->rows = search->model.rows;
     memcpy(trial->row, search->model.row, sizeof trial->row);
     memcpy(trial->target, search->model.target, sizeof trial->target);
-    double best = search_likelihood(search, search->parameter);
+    double best = count > 0 ? search_likelihood(search, search->parameter) : 0;
     for (size_t i = 0; i < count; i++) {
         const size_t j = search->fits++ % parameters;
         const double from = search->parameter[j];
@@ -712,7 +713,11 @@ Status search_propose(Search *search) {
         search_fill(search, point);
     } else {
         const SearchScale scale = search_scale(search);
-        const size_t fits = search->fits == 0 ? FIRST_FITS * (n + 2) : 1;
+        // The more rows, the longer a fit takes and the less one more of them changes it.
+        const size_t every = 1 + search->added / ROWS_PER_FIT;
+        const size_t fits = search->fits == 0               ? FIRST_FITS * (n + 2)
+                            : search->proposed % every == 0 ? 1
+                                                            : 0;
         TRY(search_model_make(search, &scale, fits));
         TRY(search_choose(search, &scale, point));
     }

@@ -512,8 +512,8 @@ typedef struct SensitivityWork {
     Outcome *own;                        // of the scene itself
     size_t rows[SENSITIVITY_PARAMETERS]; // of the answer, those that have steps
     size_t steps;                        // members
-    double values[SENSITIVITY_PARAMETERS * ROW_STEPS][STATISTICS_METRICS]; // of each step
-    SpectrumAccumulator sums;                                              // of the drawn runs
+    double values[SENSITIVITY_PARAMETERS * ROW_STEPS][STATISTICS_USUAL]; // of each step
+    SpectrumAccumulator sums;                                            // of the drawn runs
 } SensitivityWork;
 
 static int sensitivity_parameter(const char *name) {
@@ -591,7 +591,7 @@ static Status sensitivity_fold(void *of, size_t member, StudyPart *part) {
         work->answer->steps += run->steps;
     if (member >= work->steps)
         return sensitivity_fold_draw(work, member - work->steps, part);
-    for (int metric = 0; metric < STATISTICS_METRICS; metric++)
+    for (int metric = 0; metric < STATISTICS_USUAL; metric++)
         work->values[member][metric] = statistics_value(&run->summary, metric);
     if (run->why != NULL) {
         char **why = &work->answer->response.at[work->rows[member / ROW_STEPS]].why;
@@ -630,7 +630,7 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index) {
     SensitivityRow *row = &work->answer->response.at[work->rows[index]];
     for (size_t step = 0; step < SENSITIVITY_STEPS; step++)
         TRY(study_add_real(sensitivity_step(work, step), &row->steps));
-    for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
+    for (int metric = 0; metric < STATISTICS_USUAL; metric++) {
         const double value = statistics_value(&work->own->summary, metric);
         double quotients[SENSITIVITY_STEPS];
         if (metric == STATISTICS_PEAK_CONTACT_FORCE && !work->has_force)
@@ -653,7 +653,7 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index) {
 static Status sensitivity_fill_statistics(const SensitivityWork *work) {
     Sensitivity *answer = work->answer;
     static const RunTable none = {NULL, 0};
-    for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
+    for (int metric = 0; metric < STATISTICS_USUAL; metric++) {
         const bool is_known = metric != STATISTICS_PEAK_CONTACT_FORCE || work->has_force;
         RunStatistic *statistic = list_append(&answer->statistics, sizeof *statistic);
         TRY(status_made(statistic != NULL));

@@ -68,7 +68,7 @@ size_t stopping_rule_next_check(size_t count) {
     return count < STOPPING_RULE_PILOT ? STOPPING_RULE_PILOT : count + (count + 3) / 4;
 }
 
-const char *const statistics_metric_names[] = {STUDY_METRICS_USUAL, "psd", NULL};
+const char *const statistics_metric_names[] = {STUDY_METRICS, "psd", NULL};
 
 double statistics_value(const Summary *summary, int metric) {
     return study_summary_value(summary, statistics_metric_names[metric]);

@@ -50,8 +50,8 @@ typedef struct StudyFailures {
 Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
                           const char *why);
 
-// The metrics of a summary that studies compare, by their names there; the usual ones have
-// statistics and are the default.
+// The metrics of a summary that studies compare, by their names there; the usual ones
+// are the default.
 #define STUDY_METRICS_USUAL                                                                        \
     "peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",   \
         "peak_contact_force"

@@ -73,6 +73,8 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/compare",              "read",   NULL,         "The study's variants or chart, format by Accept", results_study, NULL},
     {"GET",    "/v1/results/{id}/sensitivity.{format}", "read",   NULL,         "The study's slopes and bands as json, the slopes as csv, or its chart as svg", results_study, NULL},
     {"GET",    "/v1/results/{id}/sensitivity",          "read",   NULL,         "The study's slopes or chart, format by Accept", results_study, NULL},
+    {"GET",    "/v1/results/{id}/response.{format}",    "read",   NULL,         "The response curve with periodic orbits and their stability, as json, csv, npz or svg", results_study, NULL},
+    {"GET",    "/v1/results/{id}/response",             "read",   NULL,         "The response curve with periodic orbits and their stability, format by Accept", results_study, NULL},
     {"GET",    "/v1/results/{id}/fragility.{format}",   "read",   NULL,         "The study's curves and distributions as json, its runs as csv or npz, or its chart as svg", results_study, NULL},
     {"GET",    "/v1/results/{id}/fragility",            "read",   NULL,         "The study's curves, runs or chart, format by Accept", results_study, NULL},
     {"GET",    "/v1/results/{id}/calibration.{format}", "read",   NULL,         "The fitted parameters as json or csv, or measured and fitted motions as svg", results_study, NULL},

@@ -38,7 +38,8 @@ struct Command {
 
 // Each is in the file of its name or of its resource: jobs.c, records.c, study.c.
 extern const Command command_serve, command_run, command_check, command_tradeoff, command_ensemble,
-    command_study, command_sweep, command_import, command_materials, command_records, command_token,
+    command_study, command_sweep, command_optimize, command_calibrate, command_response,
+    command_fragility, command_import, command_materials, command_records, command_token,
     command_backup, command_restore, command_check_db, command_submit, command_watch, command_get,
     command_cancel, command_compare;
 

@@ -5,6 +5,7 @@
 #define SERVER_CLI_FILES_H
 
 #include "core/base/progress.h"
+#include "core/formats/ground_motion_text.h"
 #include "server/cli/command.h"
 #include "server/util/bytes.h"
 
@@ -21,6 +22,22 @@ int input_command(const Command *self, const char *what, const Options *options,
                   Status (*run)(const char *path, const Bytes *text, void *settings,
                                 Problem *problem),
                   Problem *problem);
+// Adds the ground motions of files, each under its name without folder and extension, to a database
+// without a folder: scenes name them. Prints the faults of a file.
+struct Db;
+enum { RECORD_FILES = 1000 };
+typedef struct RecordFiles {
+    Texts record; // paths
+    int unit;     // of a file that states none; CHOICE_ABSENT: none
+} RecordFiles;
+// The rows of settings with both members.
+#define RECORD_ROWS(Type)                                                                          \
+    FIELD_TEXTS(Type, record, NULL, NULL, RECORD_FILES, PRESENCE_OPTIONAL, 0,                      \
+                "ground motion that the scene names by the name of this file; may be given "       \
+                "again"),                                                                          \
+        FIELD_CHOICE(Type, unit, acceleration_unit_names, OPTIONAL,                                \
+                     "of these files: g, m/s^2 or cm/s^2; overrides the files")
+Status record_files_add(struct Db *db, const RecordFiles *files, Problem *problem);
 // "csv" of "/data/out.csv"; NULL if there is none.
 const char *path_extension(const char *path);
 

@@ -8,6 +8,7 @@
 #include "core/formats/ground_motion_text.h"
 #include "server/cli/client.h"
 #include "server/cli/files.h"
+#include "server/db/records.h"
 #include "server/json/encode.h"
 
 #define G 9.80665 // [m/s^2]
@@ -131,6 +132,52 @@ static void record_name(const char *path, char name[RECORD_NAME_SIZE]) {
         if (!((*c >= 'A' && *c <= 'Z') || (*c >= 'a' && *c <= 'z') || (*c >= '0' && *c <= '9') ||
               strchr("._-", *c) != NULL))
             *c = '-';
+}
+
+// Adds the ground motion of a file to a database that only this process has.
+static Status record_file_add(Db *db, const char *path, int unit, Problem *problem) {
+    char name[RECORD_NAME_SIZE], digest[RECORD_DIGEST_SIZE];
+    const GroundMotionOptions options = {.interval = (double)NAN, .unit = unit};
+    GroundMotionText motion = {0};
+    Bytes text = {0};
+    bool is_there;
+    record_name(path, name);
+    Status status = input_read(path, &text, problem);
+    if (status == STATUS_OK)
+        status = ground_motion_text_read(text.at != NULL ? text.at : "", text.count, RECORD_SAMPLES,
+                                         &options, &motion, problem);
+    if (status == STATUS_OK) {
+        const RecordLook look = record_look(&motion.samples, motion.interval, 1);
+        record_digest(motion.interval, &motion.samples, digest);
+        const RecordRow row = {.name = name,
+                               .layout = (char *)(uintptr_t)motion.layout,
+                               .unit = (char *)(uintptr_t)acceleration_unit_names[motion.unit],
+                               .interval = motion.interval,
+                               .count = motion.samples.count,
+                               .peak = fmax(look.highest, -look.lowest),
+                               .peak_time = (double)look.peak_at * motion.interval,
+                               .peak_velocity = look.peak_velocity,
+                               .end_velocity = look.end_velocity,
+                               .digest = digest};
+        status = db_record_add(db, &row, &motion.samples, &is_there, problem);
+    }
+    ground_motion_text_clear(&motion);
+    bytes_clear(&text);
+    return status;
+}
+
+Status record_files_add(Db *db, const RecordFiles *files, Problem *problem) {
+    const Texts *paths = &files->record;
+    for (size_t i = 0; i < paths->count; i++) {
+        const Status status = record_file_add(db, paths->at[i], files->unit, problem);
+        if (status == STATUS_OK)
+            continue;
+        command_print_faults(paths->at[i], ", ", "", problem);
+        problem_clear(problem);
+        return problem_add(problem, status, "--record", "%.200s is not read as a ground motion",
+                           paths->at[i]);
+    }
+    return STATUS_OK;
 }
 
 static void record_report(const char *path, const JsonDocument *record, bool is_new) {

@@ -37,14 +37,16 @@ static void warnings_print(const char *path, const Warnings *warnings) {
 }
 
 // Reads and resolves a scene and prints its warnings. Both outputs are cleared in any case.
-static Status scene_prepare(const char *path, const Bytes *text, const SimulationLimits *limits,
-                            StudyRequest *request, Warnings *warnings, Problem *problem) {
+static Status scene_prepare(const char *path, const Bytes *text, const RecordFiles *records,
+                            const SimulationLimits *limits, StudyRequest *request,
+                            Warnings *warnings, Problem *problem) {
     Db *db = NULL;
     *request = (StudyRequest){0};
     *warnings = (Warnings){0};
     TRY(db_open(NULL, &db, problem));
-    const Status status =
-        jobs_prepare(db, text->at, text->count, limits, request, warnings, problem);
+    Status status = record_files_add(db, records, problem);
+    if (status == STATUS_OK)
+        status = jobs_prepare(db, text->at, text->count, limits, request, warnings, problem);
     db_close(db);
     if (status == STATUS_OK)
         warnings_print(path, warnings);
@@ -53,6 +55,8 @@ static Status scene_prepare(const char *path, const Bytes *text, const Simulatio
 
 typedef struct RunSettings {
     char *output;
+    Texts record;
+    int unit;
     double max_cpu_seconds;
     const TableFormat *format; // of the output's extension; NULL without output
 } RunSettings;
@@ -60,6 +64,7 @@ typedef struct RunSettings {
 static const Field run_fields[] = {
     FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
                "write to this file; its extension says what"),
+    RECORD_ROWS(RunSettings),
     CPU_ROW(RunSettings),
     FIELD_END,
 };
@@ -177,7 +182,8 @@ static Status run_scene(const char *path, const Bytes *text, void *of, Problem *
     const SimulationLimits limits = scene_limits(settings->max_cpu_seconds);
     StudyRequest request;
     Warnings warnings;
-    Status status = scene_prepare(path, text, &limits, &request, &warnings, problem);
+    Status status = scene_prepare(path, text, &(RecordFiles){settings->record, settings->unit},
+                                  &limits, &request, &warnings, problem);
     if (status == STATUS_OK && request.study != NULL)
         status =
             problem_add(problem, STATUS_INVALID, "/study",
@@ -237,12 +243,15 @@ const Command command_run = {
 
 typedef struct CheckSettings {
     bool json;
+    Texts record;
+    int unit;
     double max_cpu_seconds;
 } CheckSettings;
 
 static const Field check_fields[] = {
     FIELD_FLAG(CheckSettings, json, false,
                "print the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
+    RECORD_ROWS(CheckSettings),
     CPU_ROW(CheckSettings),
     FIELD_END,
 };
@@ -275,7 +284,9 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
     DryRun run = {0};
     Bytes bytes = {0};
     TRY(db_open(NULL, &db, problem));
-    Status status = jobs_open(db, &settings, &manager, problem);
+    Status status = record_files_add(db, &(RecordFiles){asked->record, asked->unit}, problem);
+    if (status == STATUS_OK)
+        status = jobs_open(db, &settings, &manager, problem);
     if (status == STATUS_OK)
         status = jobs_dry_run(manager, text->at, text->count, &run, problem);
     if (status == STATUS_OK)
@@ -315,6 +326,8 @@ const Command command_check = {
 typedef struct StudySettings {
     const Command *command;
     Texts output;
+    Texts record;
+    int unit;
     bool json;
     double max_cpu_seconds;
     int metric; // of the study's own names; CHOICE_ABSENT
@@ -444,7 +457,8 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     const Texts *outputs = &settings->output;
     StudyRequest request;
     Warnings warnings;
-    Status status = scene_prepare(path, text, &limits, &request, &warnings, problem);
+    Status status = scene_prepare(path, text, &(RecordFiles){settings->record, settings->unit},
+                                  &limits, &request, &warnings, problem);
     if (status == STATUS_OK)
         status = study_choose(&request, settings, problem);
     if (status == STATUS_OK)
@@ -470,6 +484,7 @@ static int study_command_run(const Command *self, void *of, const Options *optio
 static const Field study_fields[] = {
     OUTPUT_ROW(".json the whole or .csv the table or .svg the chart, where the study has them"),
     JSON_ROW,
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -505,6 +520,7 @@ static const Field tradeoff_fields[] = {
                 "try this solver only; may be given again"),
     FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL,
                "solver steps a point may be predicted to take (5e7)"),
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -570,9 +586,12 @@ static const Field ensemble_fields[] = {
                 "seed of the first (the scene's own)"),
     FIELD_REAL(StudySettings, target, NULL, ANY, OPTIONAL,
                "relative error wanted of the metric's mean: no more runs than keep it"),
-    FIELD_CHOICE(StudySettings, metric, statistics_metric_names, OPTIONAL,
-                 "peak_displacement, rms_displacement (usual), peak_acceleration, "
-                 "rms_acceleration, impacts, peak_contact_force or psd"),
+    FIELD_CHOICE(
+        StudySettings, metric, statistics_metric_names, OPTIONAL,
+        "peak_displacement, rms_displacement (usual), peak_acceleration, "
+        "rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear "
+        "or psd"),
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -647,6 +666,7 @@ const Command command_ensemble = {
 static const Field sweep_fields[] = {
     OUTPUT_ROW(".json, .csv, .npy, .npz or .mat the table or .svg the chart"),
     JSON_ROW,
+    RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
     FIELD_END,
 };
@@ -705,4 +725,138 @@ const Command command_sweep = {
     .run = study_command_run,
     .study = &(const StudyCommand){&study_sweep, NULL, sweep_add},
     .view = &sweep_view,
+};
+
+// Of the studies whose request is all in the scene.
+static const Field design_fields[] = {
+    OUTPUT_ROW(".json the whole, .csv or .npz the table or .svg the chart"),
+    JSON_ROW,
+    RECORD_ROWS(StudySettings),
+    CPU_ROW(StudySettings),
+    FIELD_END,
+};
+
+static const PrintTableView optimize_view = {
+    .skipped = (const char *const[]){"kind", "history", NULL},
+    .lists = (const PrintTableColumns[]){{"values", {"pointer", "value"}},
+                                         {"objectives", {"metric", "value", "interval_95"}},
+                                         {"rivals", {"difference", "interval_95", "values"}},
+                                         {NULL, {NULL}}},
+};
+
+const Command command_optimize = {
+    .name = "optimize",
+    .operands = "SCENE.json",
+    .summary = "values of members of a scene that make a metric best, under constraints",
+    .help = "  impactd optimize scene.json                     the best values, and rivals\n"
+            "  impactd optimize scene.json -o out.svg          the chart of the search\n"
+            "  impactd optimize scene.json -o out.csv          every candidate\n"
+            "  impactd optimize scene.json --json              the whole answer\n"
+            "\n"
+            "The scene says what varies and what is best:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"optimize\", \"objectives\": [{\"metric\": "
+            "\"rms_displacement\"}],\n"
+            "    \"variables\": [{\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, \"to\": "
+            "0.03}],\n"
+            "    \"over\": {\"runs\": 64}}\n"
+            "\n"
+            "Each candidate is run over the same seeds or records. Exit code 3 if the scene\n"
+            "has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_optimize, NULL, NULL},
+    .view = &optimize_view,
+};
+
+static const PrintTableView calibrate_view = {
+    .skipped = (const char *const[]){"kind", "history", "motions", "correlation", NULL},
+    .lists = (const PrintTableColumns[]){
+        {"parameters",
+         {"pointer", "value", "unit", "standard_error", "interval_95", "identifiable"}},
+        {NULL, {NULL}}}};
+
+const Command command_calibrate = {
+    .name = "calibrate",
+    .operands = "SCENE.json",
+    .summary = "fit parameters of a scene to measured motions",
+    .help = "  impactd calibrate scene.json                    parameters with their intervals\n"
+            "  impactd calibrate scene.json -o out.svg         measured and fitted motions\n"
+            "  impactd calibrate scene.json --json             the whole answer\n"
+            "\n"
+            "The scene holds the measurement:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"calibrate\",\n"
+            "    \"parameters\": [{\"pointer\": \"/dampers/0/buffer/restitution\", \"from\": 0.3, "
+            "\"to\": 0.9}],\n"
+            "    \"measured\": [{\"channel\": \"displacement\", \"interval\": 0.01, \"samples\": "
+            "[...]}]}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_calibrate, NULL, NULL},
+    .view = &calibrate_view,
+};
+
+static const PrintTableView response_view = {
+    .skipped = (const char *const[]){"kind", "multipliers", "section", NULL},
+    .lists = (const PrintTableColumns[]){
+        {"points",
+         {"value", "direction", "branch", "period", "impacts_per_period", "stable",
+          "peak_displacement", "undamped_peak_displacement", "lyapunov"}},
+        {NULL, {NULL}}}};
+
+const Command command_response = {
+    .name = "response",
+    .operands = "SCENE.json",
+    .summary = "steady motion under a sine while a number varies: periodic orbits, stability",
+    .help = "  impactd response scene.json                     the curve as a table\n"
+            "  impactd response scene.json -o out.svg          the chart\n"
+            "  impactd response scene.json -o out.csv          the table as a file\n"
+            "\n"
+            "The scene has a sine, and says what varies:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"response\", \"direction\": \"both\", \"axis\":\n"
+            "    {\"pointer\": \"/excitation/frequency\", \"from\": 3, \"to\": 5, \"count\": 81}}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_response, NULL, NULL},
+    .view = &response_view,
+};
+
+static const PrintTableView fragility_view = {
+    .skipped = (const char *const[]){"kind", "curves", NULL},
+    .lists =
+        (const PrintTableColumns[]){{"limits",
+                                     {"metric", "value", "exceeded", "median", "median_interval_95",
+                                      "dispersion", "dispersion_interval_95"}},
+                                    {NULL, {NULL}}}};
+
+const Command command_fragility = {
+    .name = "fragility",
+    .operands = "SCENE.json",
+    .summary = "probability of exceeding limits under ground motions of rising intensity",
+    .help = "  impactd fragility scene.json --record a.AT2 --record b.AT2\n"
+            "  impactd fragility scene.json --record a.AT2 --record b.AT2 -o out.svg\n"
+            "\n"
+            "The scene names the ground motions by the names of the files:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"fragility\", \"records\": [\"a\", \"b\"], \"intensity\": "
+            "\"pga\",\n"
+            "    \"levels\": {\"from\": 0.5, \"to\": 10, \"count\": 20},\n"
+            "    \"limits\": [{\"metric\": \"peak_displacement\", \"value\": 0.02}]}\n"
+            "\n"
+            "A server has them by name (impactd records add, impactd submit). Exit code 3 if\n"
+            "the scene has faults.\n",
+    .options = design_fields,
+    .size = sizeof(StudySettings),
+    .run = study_command_run,
+    .study = &(const StudyCommand){&study_fragility, NULL, NULL},
+    .view = &fragility_view,
 };

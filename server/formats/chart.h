@@ -12,7 +12,7 @@ enum {
     CHART_STRONG,       // a colour: that of the text
     CHART_PANELS = 6,
     CHART_SERIES = 48, // of a panel
-    CHART_TICKS = 6,
+    CHART_TICKS = 8,
     CHART_TEXT = 160,
     CHART_LABEL = 48,
     CHART_LEGEND_MARGIN = 100, // a wider margin on the right has the legends, else they are inside

@@ -8,8 +8,8 @@
 #include "server/formats/chart.h"
 #include "server/formats/study_formats.h"
 
-static const double optimum_outlier =
-    4; // spreads of the better half above which values are at the edge
+// Values are at the edge beyond so many times the difference from the best to the median.
+static const double optimum_outlier = 4;
 
 static int optimum_compare_values(const void *a, const void *b) {
     const double x = *(const double *)a, y = *(const double *)b;

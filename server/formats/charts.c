@@ -71,11 +71,11 @@ static void charts_add_bands(Chart *chart, ChartPanel *panel, const Reals *frequ
 }
 
 // A row for each metric of a study's statistics, the first at the top.
-static void charts_add_rows(Chart *chart, ChartPanel *panel) {
-    for (int metric = 0; metric < STATISTICS_METRICS; metric++)
+static void charts_add_rows(Chart *chart, ChartPanel *panel, int metrics) {
+    for (int metric = 0; metric < metrics; metric++)
         panel->y.ticks[metric] =
             (ChartTick){-metric, charts_words(chart, statistics_metric_names[metric]), NULL};
-    panel->y.tick_count = STATISTICS_METRICS;
+    panel->y.tick_count = (size_t)metrics;
 }
 _Static_assert((int)STATISTICS_METRICS <= (int)CHART_TICKS, "a row needs a label");
 
@@ -219,7 +219,7 @@ static void ensemble_add_ranges(Chart *chart, ChartPanel *panel, const Ensemble 
 
 static void ensemble_add_statistics(Chart *chart, const Ensemble *ensemble) {
     ChartPanel *panel = chart_panel(chart, NULL, 36 * STATISTICS_METRICS);
-    charts_add_rows(chart, panel);
+    charts_add_rows(chart, panel, STATISTICS_METRICS);
     panel->x.title = "over the mean";
     for (int metric = 0; metric < STATISTICS_METRICS; metric++) {
         const RunStatistic *statistic = &ensemble->statistics.of[metric];
@@ -269,7 +269,7 @@ static void ensemble_add_indices(Chart *chart, const Ensemble *ensemble) {
     if (count == 0)
         return;
     ChartPanel *panel = chart_panel(chart, "Sobol indices", 36 * STATISTICS_METRICS);
-    charts_add_rows(chart, panel);
+    charts_add_rows(chart, panel, STATISTICS_METRICS);
     panel->x.title = "part of the variance, alone (dot) and in all (ring)";
     double *first = chart_new(chart, count, sizeof *first),
            *total = chart_new(chart, count, sizeof *total), *y = chart_new(chart, count, sizeof *y);
@@ -414,7 +414,7 @@ void chart_sensitivity(const Variant *answer, Bytes *bytes) {
                          &sensitivity->frequency, &sensitivity->spectra);
     ChartPanel *panel =
         chart_panel(&chart, "Relative change of the statistic over that of the parameter", 300);
-    charts_add_rows(&chart, panel);
+    charts_add_rows(&chart, panel, STATISTICS_USUAL);
     for (size_t i = 0; i < count; i++)
         sensitivity_add_slopes(&chart, panel, &sensitivity->response.at[i], i,
                                0.6 * (0.5 - ((double)i + 0.5) / (double)count));
@@ -713,8 +713,8 @@ enum { SVG_POINTS = 800 }; // of a line over time
 void chart_response_spectrum(const char *record, double damping_ratio, const Columns *columns,
                              Bytes *bytes) {
     Chart chart = {.width = 760, .left = 80, .right = 14, .title = "Response spectrum"};
-    chart.heading = chart_text(&chart, "Response spectrum of %s, damping ratio %g", record,
-                               damping_ratio);
+    chart.heading =
+        chart_text(&chart, "Response spectrum of %s, damping ratio %g", record, damping_ratio);
     for (size_t i = columns->count; i-- > 1;) {
         const Column *column = &columns->at[i];
         const char *name = chart_quantity(&chart, charts_words(&chart, column->name), column->unit);

@@ -9,8 +9,21 @@ void document_warnings(Bytes *bytes, const Warnings *warnings) {
                 WRITE_REPORT);
 }
 
+// Takes the text without the spaces between its members: a result without channels is stored in
+// 4 KiB.
 static Status document_take(Bytes *bytes, char **target) {
-    return status_made((*target = bytes_take(bytes, NULL)) != NULL);
+    char *text = *target = bytes_take(bytes, NULL);
+    TRY(status_made(text != NULL));
+    bool is_in_text = false;
+    for (const char *from = text; *from != '\0'; from++) {
+        is_in_text = is_in_text != (*from == '"');
+        if (*from == '\\')
+            *text++ = *from++;
+        if (*from != ' ' || is_in_text)
+            *text++ = *from;
+    }
+    *text = '\0';
+    return STATUS_OK;
 }
 
 Status document_outcome(const Outcome *outcome, ResultRow *row) {

@@ -98,6 +98,9 @@ static void encode_put_value(Bytes *bytes, const Field *field, const void *membe
 
 // Whether the member is empty and null says so: left out it would be read back with its defaults.
 static bool encode_is_emptied(const Field *field, const void *item) {
+    const bool is_numbers = field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS;
+    if (is_numbers && (field->flags & FIELD_NULL_IS_EMPTY) != 0)
+        return field_is_absent(field, item);
     if (field->kind == FIELD_KIND_TEXT && (field->flags & FIELD_NULL_IS_EMPTY) != 0) {
         const char *text = *(char *const *)(const void *)((const char *)item + field->offset);
         return text != NULL && text[0] == '\0';

@@ -55,6 +55,7 @@ const SchemaDocument schema_documents[] = {
     {"fragility", "Answer of the study fragility", NULL, &study_fragility},
     {"calibrate", "Answer of the study calibrate", NULL, &study_calibrate},
     {"optimize", "Answer of the study optimize", NULL, &study_optimize},
+    {"response", "Answer of the study response", NULL, &study_response},
     {NULL, NULL, NULL, NULL},
 };
 // clang-format on
@@ -256,7 +257,8 @@ static void schema_value(Bytes *bytes, SchemaUse use, const Field *field) {
 static bool schema_is_nullable(const Field *field) {
     const bool is_list = field->kind == FIELD_KIND_REALS || field->kind == FIELD_KIND_ROWS ||
                          field->kind == FIELD_KIND_TEXTS || field->kind == FIELD_KIND_LIST;
-    return field->presence == PRESENCE_OPTIONAL && !is_list && field->kind != FIELD_KIND_FLAG;
+    return field->presence == PRESENCE_OPTIONAL && field->kind != FIELD_KIND_FLAG &&
+           (!is_list || (field->flags & FIELD_NULL_IS_EMPTY) != 0);
 }
 
 static void schema_properties(Bytes *bytes, SchemaUse use, const Field *fields) {

@@ -21,7 +21,7 @@ INPUTS = [{"pointer": "/dampers/0/clearance", "distribution": "normal", "mean": 
           {"pointer": "/dampers/0/buffer", "distribution": "material", "contact_time_deviation": 0.1}]
 SVG = "{http://www.w3.org/2000/svg}"
 STATISTICS = ["peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",
-              "peak_contact_force"]
+              "peak_contact_force", "peak_storey_drift", "peak_base_shear"]
 
 
 def study(duration=5, **members):
@@ -59,7 +59,8 @@ def check_statistics(answer):
                   "q25": numpy.quantile(values, 0.25), "q75": numpy.quantile(values, 0.75),
                   "q95": numpy.quantile(values, 0.95)}
         for member, value in wanted.items():
-            assert close(told[member], value), (name, member, told[member], value)
+            # Equal values deviate by rounding alone.
+            assert close(told[member], value) or abs(value) < 1e-14 * values.mean(), (name, member, told[member], value)
         for member in ("minimum", "maximum"):
             seeds = [row["seed"] for row in rows if row[name] == told[member]]
             assert told[member + "_seed"] == seeds[0], (name, member)

@@ -133,7 +133,7 @@ def test_real_answers_have_the_promised_shapes():
         swept = program.finished(daemon, program.scene("sweep_frequency"))
         sweep = {"id": swept["result"], "index": "7"}
         studies = {}
-        for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity"),
+        for name, kind in (("compare_aluminium", "compare"), ("sensitivity_sponge", "sensitivity"), ("response_sponge", "response"),
                            ("calibrate_free_sponge", "calibration")):
             studies[kind] = {"id": program.finished(daemon, program.scene(name))["result"]}
         best = {**program.scene("paper_free_sponge"), "duration": 1, "study": {

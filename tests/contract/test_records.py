@@ -425,6 +425,25 @@ def test_a_sweep_runs_over_records():
         assert daemon.submit(digests).status == 422
 
 
+def test_a_file_is_a_record_where_there_is_no_daemon():
+    """--record FILE: the scene names it as on a daemon, and its result has the same id; 3 and 4 for what is no record."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "shaken.txt")
+        with open(path, "w", encoding="ascii") as file:
+            file.write("5 0.02\n0\n0.1\n-0.2\n0.1\n0\n")
+        asked = json.dumps(scene({"name": "shaken"}))
+        code, out, _ = program.run("run", "-", "--record", path, "--unit", "g", text=asked)
+        assert code == 0
+        with open(path, "rb") as file, program.daemon() as daemon:
+            made = daemon.request("POST", "/v1/records?name=shaken&unit=g", body=file.read(), headers={"Content-Type": "text/plain"})
+            assert made.status == 201, made
+            assert program.finished(daemon, scene({"name": "shaken"}))["result"] == json.loads(out)["result"]
+        code, _, errors = program.run("run", "-", text=asked)
+        assert code == 3 and "--record FILE" in errors, errors
+        assert program.run("check", "-", "--record", path + "x", text=asked)[0] == 4
+        assert program.run("run", "-", "--record", __file__, text=asked)[0] == 3
+
+
 def test_studies_run_on_a_named_record():
     """compare, sensitivity and tradeoff of a scene that names a record answer as those of its samples."""
     with program.daemon("--workers", "2") as daemon:

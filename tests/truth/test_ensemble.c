@@ -119,11 +119,8 @@ static void whole_make(const StudyRequest *inquiry, Whole *whole) {
             fail_msg("%s", problem.detail);
         const Summary *summary = &outcome->summary;
         const Columns *densities = &outcome->spectrum.densities;
-        const double values[] = {summary->peak_displacement, summary->rms_displacement,
-                                 summary->peak_acceleration, summary->rms_acceleration,
-                                 (double)summary->impacts,   summary->peak_contact_force};
         for (int metric = 0; metric < STATISTICS_METRICS; metric++)
-            whole->values[metric][i] = values[metric];
+            whole->values[metric][i] = statistics_value(summary, metric);
         whole->rows = densities->rows;
         if (i == 0)
             whole->densities = calloc(whole->runs * whole->rows, sizeof(double));

@@ -1,4 +1,4 @@
-// A study of kind "ensemble": many seeds of one random base, their means with confidence, and their spread.
+// The study "ensemble": means over many seeds with their confidence and spread.
 import { table } from "./dom.js";
 import { plot } from "./plot.js";
 import { between, lesson, plain, sceneLink, spectrum, spread } from "./study_bits.js";
@@ -16,7 +16,7 @@ export function show(host, { result: { scene, study } }) {
     plot(host, { ...spectrum(channel, unit), at: study.frequency, series: [...(low ? bands() : []), { label: "mean", y: mean }],
       summary: `The mean is largest at ${quantity(study.frequency[most], "Hz", 3)}: ${quantity(mean[most], unit, 3)}.` });
   }
-  const seeded = (seed) => sceneLink(`seed ${seed}`, { ...plain(scene), excitation: { ...scene.excitation, seed } });
+  const seeded = (seed) => study.inputs.length ? `seed ${seed}` : sceneLink(`seed ${seed}`, { ...plain(scene), excitation: { ...scene.excitation, seed } });
   host.append(table(`Each number over ${made} runs`, [...spread("Mean", "mean"),
     { label: `The ${sure}`, numeric: true, cell: ({ low, high, unit }) => between(low, high, unit) },
     { label: "Largest", numeric: true, cell: (one) => [quantity(one.maximum, one.unit, 3), " ", seeded(one.maximum_seed)] },

@@ -296,7 +296,7 @@ TEST(what_has_no_closed_form_says_why) {
     Sensitivity *answer = make(&inquiry);
     assert_non_null(strstr(answer->contact.at[1].why, "impulses have no stiffness"));
     // Impulses have no force either.
-    assert_true(answer->response.at[0].slopes.count + 1 == STATISTICS_METRICS);
+    assert_true(answer->response.at[0].slopes.count + 1 == STATISTICS_USUAL);
     clear(&inquiry, answer);
     inquiry = study_request_make(0.61, 0.025, 1);
     paper_model(&inquiry.simulation, "flores");
