@@ -87,6 +87,7 @@ typedef struct CalibrateResult {
     NormalEquations equations; // of the best point
     double variance, starts[CALIBRATE_KEPT][CALIBRATE_VARIABLES];
     size_t start_count, rows;
+    bool is_worse; // than the window before
 } CalibrateResult;
 
 typedef struct CalibrateWork {
@@ -97,8 +98,10 @@ typedef struct CalibrateWork {
     CalibrateStage stage;
     int fit; // CalibrateFit
     double ends[CALIBRATE_WINDOWS];
-    size_t windows, window, repeats;
+    size_t all_windows, windows, window, repeats;
     bool is_limited; // the record is longer than can be predicted
+    bool is_settled; // between the last two windows
+    bool is_final;   // no other window is tried
     bool is_beyond;  // because of its trust horizon
     bool is_chaotic; // and spectra are fitted therefore
     double horizon;  // where the fit ends then [s]
@@ -115,7 +118,7 @@ typedef struct CalibrateWork {
     size_t refinements;
     uint64_t draws;
     size_t explorations, retries;
-    CalibrateResult results[CALIBRATE_WINDOWS];
+    CalibrateResult results[CALIBRATE_WINDOWS + 1];
     CalibratePoints points; // of the window
     CalibrateAssessment assessment;
 } CalibrateWork;

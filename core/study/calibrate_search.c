@@ -518,7 +518,7 @@ static void calibrate_save(CalibrateWork *work) {
 // Whether the window before is a result on its own, and this one is so much more sensitive that
 // its valleys may have been missed.
 static bool calibrate_may_return(const CalibrateWork *work, double limit) {
-    if (work->window == 0 || work->fit == CALIBRATE_PSD)
+    if (work->window == 0 || work->fit == CALIBRATE_PSD || work->is_final)
         return false;
     const CalibrateResult *before = &work->results[work->window - 1];
     const CalibrateStart *best = calibrate_best(work);
@@ -535,24 +535,6 @@ static bool calibrate_may_return(const CalibrateWork *work, double limit) {
     return growth > limit * limit;
 }
 
-// The window before becomes the last one.
-static Status calibrate_return(CalibrateWork *work) {
-    const CalibrateResult *before = &work->results[--work->window];
-    work->windows = work->window + 1;
-    work->horizon = work->ends[work->window];
-    work->is_limited = true;
-    work->stage = STAGE_FIT;
-    work->explorations = 0;
-    for (size_t i = 0; i < work->start_count; i++)
-        calibrate_drop(&work->starts[i]);
-    work->start_count = before->start_count;
-    for (size_t i = 0; i < work->start_count; i++) {
-        work->starts[i] = (CalibrateStart){.number = i};
-        memcpy(work->starts[i].at, before->starts[i], sizeof before->starts[i]);
-    }
-    return calibrate_open(work, true);
-}
-
 // Whether the noise of this window is larger than was given, or than that of the window before.
 static bool calibrate_is_worse(const CalibrateWork *work, double quantile) {
     if (work->window == 0)
@@ -560,6 +542,39 @@ static bool calibrate_is_worse(const CalibrateWork *work, double quantile) {
     const double uncertain =
         2 / (double)work->rows + 2 / (double)work->results[work->window - 1].rows;
     return calibrate_variance(work, calibrate_best(work)->cost) > 1 + quantile * sqrt(uncertain);
+}
+
+// Makes the window the last one, and begins with its result.
+static Status calibrate_reopen(CalibrateWork *work) {
+    const CalibrateResult *result = &work->results[work->window];
+    work->windows = work->window + 1;
+    work->horizon = work->ends[work->window];
+    work->is_limited = work->window + 1 < work->all_windows;
+    work->stage = STAGE_FIT;
+    work->explorations = 0;
+    for (size_t i = 0; i < work->start_count; i++)
+        calibrate_drop(&work->starts[i]);
+    work->start_count = result->start_count;
+    for (size_t i = 0; i < work->start_count; i++) {
+        work->starts[i] = (CalibrateStart){.number = i};
+        memcpy(work->starts[i].at, result->starts[i], sizeof result->starts[i]);
+    }
+    return calibrate_open(work, true);
+}
+
+// The window before becomes the last one.
+static Status calibrate_return(CalibrateWork *work) {
+    calibrate_save(work);
+    work->results[work->window].is_worse = calibrate_is_worse(work, calibrate_quantile_999);
+    work->window--;
+    return calibrate_reopen(work);
+}
+
+// The window that was left is the last one after all: the one before determines less.
+static Status calibrate_go_forward(CalibrateWork *work) {
+    work->is_final = true;
+    work->window++;
+    return calibrate_reopen(work);
 }
 
 // Searches the window again from the result of the one before, beside what was found.
@@ -740,6 +755,16 @@ static Status calibrate_advance(CalibrateWork *work, bool *is_over) {
     calibrate_assess(work);
     if (work->assessment.is_ambiguous && calibrate_may_return(work, 1))
         return calibrate_return(work);
+    const CalibrateResult *longer = &work->results[work->window + 1];
+    if (!work->assessment.is_determined && work->fit == CALIBRATE_TIME && !work->is_final &&
+        !work->is_beyond && longer->start_count > 0 && !longer->is_worse)
+        return calibrate_go_forward(work);
+    if (work->is_final && work->assessment.is_ambiguous && !work->is_settled) {
+        // Neither does: the shorter one is the honest result.
+        work->is_settled = true;
+        work->window--;
+        return calibrate_reopen(work);
+    }
     if (!work->assessment.is_determined && work->is_beyond && work->fit == CALIBRATE_TIME)
         return calibrate_open_spectra(work);
     *is_over = true;
@@ -809,6 +834,7 @@ Status calibrate_search_begin(CalibrateWork *work) {
     for (size_t i = 0; i < work->parameters; i++)
         TRY(status_made((work->columns[i] = calloc(rows + 1, sizeof(double))) != NULL));
     calibrate_make_windows(work);
+    work->all_windows = work->windows;
     TRY(calibrate_place_starts(work));
     TRY(calibrate_open(work, true));
     calibrate_list_runs(work);
