@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 WEB = os.path.join(program.SOURCE, "web")
-MOST_BYTES = 200_000  # of all but vendor/
+MOST_BYTES = 205_000  # of all but vendor/
 MOST_LINES = 400
 
 TYPES = {".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
@@ -77,7 +77,7 @@ def faults(path, source):
 
 
 def test_the_dashboard_is_small():
-    """All files of web/ without the vendored library are under 200,000 bytes, as they stand."""
+    """All files of web/ without the vendored library are under 205,000 bytes, as they stand."""
     sizes = {path: os.path.getsize(os.path.join(WEB, path)) for path in own_files() if embedded(path)}
     largest = sorted(sizes.items(), key=lambda one: -one[1])[:12]
     assert sum(sizes.values()) < MOST_BYTES, f"{sum(sizes.values())} bytes; the largest: {largest}"

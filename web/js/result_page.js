@@ -16,10 +16,12 @@ import { section as take } from "./take_view.js";
 const sections = [summary, series, animation, impacts, spectrum, energy, plan];
 
 const STUDIES = { compare: "Contact models side by side", sensitivity: "What errors of the buffers do",
-  tradeoff: "Error against cost", sweep: "Many points", ensemble: "Many seeds" };
+  tradeoff: "Error against cost", sweep: "Many points", ensemble: "Many seeds", optimize: "The best values",
+  calibrate: "Parameters fitted to a measurement", response: "Response curve", fragility: "Fragility" };
+const DESIGN = ["optimize", "calibrate", "response", "fragility"]; // share a view
 
 async function showStudy(host, context) {
-  const { scene, study: { kind } } = context.result, view = await import(`./${kind}_view.js`);
+  const { scene, study: { kind } } = context.result, view = await import(`./${DESIGN.includes(kind) ? "design" : kind}_view.js`);
   const controller = await view.show(host, context);
   host.append(h("p", null, sceneLink("Change the study", scene)));
   return controller;
