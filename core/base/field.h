@@ -120,7 +120,8 @@ enum {
     FIELD_NOTE = 1,
     // ITEM: JSON null is allowed and makes every member absent (fields_clear). TEXT: JSON null is
     // allowed and means "", which is not absent and is written as null. TEXTS: JSON null is allowed
-    // and means an empty list. REALS, ROWS: an empty list is written as null.
+    // and means an empty list. REALS, ROWS: an empty
+    // list is written as null, as is a number that is unknown (NAN), and both are read back.
     FIELD_NULL_IS_EMPTY = 2,
     // TEXTS: a JSON object of strings is also allowed and stored as "key=value".
     FIELD_PAIRS = 4,

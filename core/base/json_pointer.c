@@ -399,6 +399,12 @@ void json_pointer_index(char *target, size_t size, const char *pointer, size_t i
     json_pointer_join(target, size, pointer, name);
 }
 
+bool json_pointer_overlaps(const char *a, const char *b) {
+    const size_t length = strlen(a) < strlen(b) ? strlen(a) : strlen(b);
+    return strncmp(a, b, length) == 0 && (a[length] == '\0' || a[length] == '/') &&
+           (b[length] == '\0' || b[length] == '/');
+}
+
 JsonPointer json_pointer_of(const char *pointer, const char *name) {
     JsonPointer place;
     json_pointer_join(place.at, sizeof place.at, pointer, name);

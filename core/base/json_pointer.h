@@ -16,6 +16,9 @@ typedef struct JsonPointer {
 JsonPointer json_pointer_of(const char *pointer, const char *name);
 JsonPointer json_pointer_at(const char *pointer, size_t index);
 
+// Whether one pointer is the other or above it.
+bool json_pointer_overlaps(const char *a, const char *b);
+
 // Adds a fault at "pointer/name", as problem_add and problem_add_real. Returns STATUS_INVALID.
 Status json_pointer_fault(Problem *problem, const char *pointer, const char *name,
                           const char *format, ...) __attribute__((format(printf, 4, 5)));

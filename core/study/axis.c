@@ -98,6 +98,10 @@ Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, 
         return STATUS_OK;
     if (isnan(axis->from) || isnan(axis->to) || (is_grid && axis->count == COUNT_ABSENT))
         return problem_add(problem, STATUS_INVALID, place, "%s", needs);
+    if (!isfinite(axis->to - axis->from))
+        return problem_add(problem, STATUS_INVALID, place,
+                           "is wider than a number can hold: from %s to %s",
+                           real_text(axis->from).at, real_text(axis->to).at);
     if (!is_grid && !(axis->from < axis->to))
         return problem_add(problem, STATUS_INVALID, place, "from must be below to, is %s, to is %s",
                            real_text(axis->from).at, real_text(axis->to).at);
@@ -113,29 +117,51 @@ static JsonPointer study_axis_place(const StudyAxis *axis, const char *place, si
                                  : json_pointer_at(json_pointer_of(place, "pointers").at, index);
 }
 
-// Refuses pointer `index` of axis `number` if an earlier one is the same.
-static Status study_axes_check_pointer(const StudyAxes *axes, size_t number, size_t index,
-                                       const char *place, Problem *problem) {
+// Refuses pointer `index` of axis `number` if an earlier one is the same or, but in a grid, sets
+// the same member.
+static Status study_axes_check_pointer(const StudyAxes *axes, bool is_grid, size_t number,
+                                       size_t index, const char *place, Problem *problem) {
     const char *pointer = study_axis_pointer(&axes->at[number], index);
     for (size_t i = 0; i <= number; i++) {
         const size_t count = i < number ? study_axis_pointer_count(&axes->at[i]) : index;
         for (size_t k = 0; k < count; k++)
-            if (strcmp(study_axis_pointer(&axes->at[i], k), pointer) == 0)
+            if (is_grid ? strcmp(study_axis_pointer(&axes->at[i], k), pointer) == 0
+                        : json_pointer_overlaps(study_axis_pointer(&axes->at[i], k), pointer))
                 return problem_add(problem, STATUS_INVALID,
                                    study_axis_place(&axes->at[number], place, index).at,
-                                   "is also the pointer of axis %zu: give one axis each", i);
+                                   is_grid ? "is also the pointer of axis %zu: give one axis each"
+                                           : "is also set by variable %zu: give one variable each",
+                                   i);
     }
     return STATUS_OK;
+}
+
+Status study_axis_check_physics(const StudyAxis *axis, const char *place, Problem *problem) {
+    static const char *const allowed[] = {"/structure", "/dampers", "/contact", "/excitation"};
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < study_axis_pointer_count(axis); i++) {
+        bool is_allowed = false;
+        for (size_t k = 0; k < COUNT(allowed); k++)
+            is_allowed =
+                is_allowed || json_pointer_overlaps(allowed[k], study_axis_pointer(axis, i));
+        if (!is_allowed)
+            status = problem_add(problem, STATUS_INVALID, study_axis_place(axis, place, i).at,
+                                 "must be a member of the structure, the dampers, the contact or "
+                                 "the excitation, is %.100s",
+                                 study_axis_pointer(axis, i));
+    }
+    return status;
 }
 
 Status study_axes_check(const StudyAxes *axes, bool is_grid, const char *place, Problem *problem) {
     Status status = STATUS_OK;
     for (size_t i = 0; i < axes->count; i++) {
         const JsonPointer own = json_pointer_at(place, i);
-        if (study_axis_check(&axes->at[i], is_grid, own.at, problem) != STATUS_OK)
+        if (study_axis_check(&axes->at[i], is_grid, own.at, problem) != STATUS_OK ||
+            (!is_grid && study_axis_check_physics(&axes->at[i], own.at, problem) != STATUS_OK))
             status = STATUS_INVALID;
         for (size_t k = 0; k < study_axis_pointer_count(&axes->at[i]); k++)
-            if (study_axes_check_pointer(axes, i, k, own.at, problem) != STATUS_OK)
+            if (study_axes_check_pointer(axes, is_grid, i, k, own.at, problem) != STATUS_OK)
                 status = STATUS_INVALID;
     }
     return status;

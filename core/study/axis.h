@@ -74,7 +74,10 @@ StudyValue study_axis_value(const StudyAxis *axis, size_t index);
 // Checks of one axis beyond its rows, at `place`; a range must have a count where `is_grid`, and
 // from < to where not.
 Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, Problem *problem);
-// The same of all, below `place` ("/study/axes"), and that no two vary the same member.
+// That it varies the physics alone, not how it is computed.
+Status study_axis_check_physics(const StudyAxis *axis, const char *place, Problem *problem);
+// Both of all, the second but of a grid, below `place` ("/study/axes"), and that no two vary the
+// same member.
 Status study_axes_check(const StudyAxes *axes, bool is_grid, const char *place, Problem *problem);
 
 // The row of the first member that an axis varies; NULL, and a fault below `place`, that of the

@@ -139,6 +139,14 @@ static Status calibrate_check_fit(CalibrateWork *work, bool *is_explained) {
         } else if (!isnan(target->measured->deviation)) {
             chi_square += calibrate_sum_squares(own, count);
             given += count;
+        } else if (residual->rms >= residual->measured_rms) {
+            *is_explained = false;
+            return status_made(text_format(
+                &answer->detail,
+                "the differences of %s from the best fit, %.2g %s rms, are as large as the "
+                "measured motion, %.2g %s rms",
+                residual->channel, residual->rms, residual->unit, residual->measured_rms,
+                residual->unit));
         } else if (count > 0 && calibrate_is_correlated(own, count)) {
             *is_explained = residual->rms < structured * residual->measured_rms;
             if (!*is_explained)

@@ -81,7 +81,7 @@ static const Field calibration_fields[] = {
     FIELD_COUNT(Calibration, failed, NULL, AT_MIN(0), 0, "runs that failed"),
     FIELD_CHOICE(Calibration, fit, calibrate_fit_names, OPTIONAL, "what was fitted in the end"),
     FIELD_LIST(Calibration, parameters, calibrated_parameter_fields, 0, PRESENCE_DEFAULT, "fitted parameters, in the order of the request"),
-    FIELD_ROWS(Calibration, correlation, NULL, ANY, 0, PRESENCE_OPTIONAL, "correlation of the fitted values, in that order"),
+    FIELD_ROWS_OR_NULL(Calibration, correlation, NULL, "correlation of the fitted values, in that order"),
     FIELD_REAL(Calibration, shift, "s", ANY, OPTIONAL, "by which the measured times are moved to later times"),
     FIELD_REAL(Calibration, shift_error, "s", ANY, OPTIONAL, "standard error of the shift"),
     {.name = "residual_rms", .kind = FIELD_KIND_LIST, .offset = FIELD_LIST_AT(Calibration, residuals), .fields = calibration_residual_fields, .size = sizeof(CalibrationResidual), .presence = PRESENCE_DEFAULT, .doc = "differences between fit and measurement, channel by channel"},
@@ -145,13 +145,6 @@ static Status calibrate_check_measured(const CalibrateStudy *study, const Simula
 // Members that are not part of the physics.
 static Status calibrate_check_pointer(const char *pointer, const Field *row, bool is_tag,
                                       const char *place, Problem *problem) {
-    static const char *const refused[] = {"/sample_rate", "/duration", "/output", "/accuracy"};
-    for (size_t i = 0; i < COUNT(refused); i++)
-        if (strncmp(pointer, refused[i], strlen(refused[i])) == 0)
-            return problem_add(problem, STATUS_INVALID, place,
-                               "%s cannot be fitted: give a member of the structure, the dampers, "
-                               "the contact or the excitation",
-                               pointer);
     if (is_tag || (row->kind != FIELD_KIND_REAL && row->kind != FIELD_KIND_REALS &&
                    row->kind != FIELD_KIND_ROWS))
         return problem_add(problem, STATUS_INVALID, place, "%s is not a real number", pointer);

@@ -90,20 +90,13 @@ static Status uncertain_input_check_parameters(const UncertainInput *input, size
     return status;
 }
 
-// Whether one pointer is the other or above it.
-static bool uncertain_input_overlaps(const char *a, const char *b) {
-    const size_t length = strlen(a) < strlen(b) ? strlen(a) : strlen(b);
-    return strncmp(a, b, length) == 0 && (a[length] == '\0' || a[length] == '/') &&
-           (b[length] == '\0' || b[length] == '/');
-}
-
 static Status uncertain_input_check_overlap(const UncertainInputs *inputs, size_t number,
                                             size_t index, Problem *problem) {
     const UncertainInput *input = &inputs->at[number];
     const char *pointer = uncertain_input_pointer(input, index);
     for (size_t i = 0; i <= number; i++)
         for (size_t k = 0; k < (i < number ? uncertain_input_pointers(&inputs->at[i]) : index); k++)
-            if (uncertain_input_overlaps(uncertain_input_pointer(&inputs->at[i], k), pointer))
+            if (json_pointer_overlaps(uncertain_input_pointer(&inputs->at[i], k), pointer))
                 return problem_add(problem, STATUS_INVALID,
                                    uncertain_input_place(input, number, index).at,
                                    "is also set by input %zu: give one input each", i);

@@ -13,7 +13,7 @@
 // clang-format off
 const Field measured_channel_fields[] = {
     FIELD_TEXT(MeasuredChannel, channel, 40, PRESENCE_REQUIRED, 0, "channel that was measured, as in output.channels"),
-    FIELD_REALS(MeasuredChannel, samples, NULL, ANY, MEASURED_SAMPLES, PRESENCE_REQUIRED, "measured values in the channel's unit"),
+    FIELD_REALS(MeasuredChannel, samples, NULL, WITHIN(-1e100, 1e100), MEASURED_SAMPLES, PRESENCE_REQUIRED, "measured values in the channel's unit"),
     FIELD_REAL(MeasuredChannel, interval, "s", ABOVE(0), REQUIRED, "between samples"),
     FIELD_REAL(MeasuredChannel, start, "s", AT_MIN(0), 0, "time of the first sample in the scene"),
     FIELD_REAL(MeasuredChannel, deviation, NULL, ABOVE(0), OPTIONAL, "standard deviation of the noise in the channel's unit; estimated if absent"),

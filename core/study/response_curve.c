@@ -137,6 +137,7 @@ static Status curve_check_axis(const StudyAxis *axis, const Simulation *simulati
                                Problem *problem) {
     static const char place[] = "/study/axis";
     TRY(study_axis_check(axis, true, place, problem));
+    TRY(study_axis_check_physics(axis, place, problem));
     if (axis->values.count > 0)
         return problem_add(problem, STATUS_INVALID, "/study/axis/values",
                            "cannot be followed up and down: give from, to and count");
@@ -210,8 +211,17 @@ static size_t curve_wander_cycles(const ResponseStudy *study) {
 static Status curve_cost(const void *request, const Simulation *simulation,
                          const SimulationLimits *limits, double *steps) {
     const ResponseStudy *study = request;
-    const double cycle = simulation_cost(simulation).steps /
-                         fmax(simulation->scene.duration * curve_frequency(simulation), 1);
+    const bool varies_frequency =
+        study->axis.pointer != NULL && strcmp(study->axis.pointer, "/excitation/frequency") == 0;
+    const double second = simulation_cost(simulation).steps / simulation->scene.duration;
+    // Mean length of a cycle over the points.
+    double period = 0;
+    for (size_t i = 0; i < study->axis.count; i++) {
+        const double frequency = varies_frequency ? study_axis_value(&study->axis, i).number
+                                                  : curve_frequency(simulation);
+        period += frequency > 0 ? 1 / frequency : 0; // another one fails at once
+    }
+    const double cycle = second * period / (double)study->axis.count;
     const double columns = 1 + (double)curve_state_size(simulation);
     double cycles = (double)study->settle_cycles + 2 * (double)curve_wander_cycles(study) +
                     4 * columns * (double)study->max_period;

@@ -715,9 +715,8 @@ Status search_propose(Search *search) {
         const SearchScale scale = search_scale(search);
         // The more rows, the longer a fit takes and the less one more of them changes it.
         const size_t every = 1 + search->added / ROWS_PER_FIT;
-        const size_t fits = search->fits == 0               ? FIRST_FITS * (n + 2)
-                            : search->proposed % every == 0 ? 1
-                                                            : 0;
+        const size_t fits = search->fits == 0 ? (size_t)FIRST_FITS * (n + 2)
+                                              : (size_t)(search->proposed % every == 0);
         TRY(search_model_make(search, &scale, fits));
         TRY(search_choose(search, &scale, point));
     }

@@ -194,6 +194,7 @@ static const struct {
      calibration_table,
      {{"json", "application/json", false, NULL},
       {"csv", csv_type, false, NULL},
+      {"npz", "application/x-npz", true, NULL},
       {"svg", chart_type, false, chart_calibration}}},
     {&study_optimize,
      table_optimum,

@@ -331,11 +331,13 @@ static void decode_short(Decoder *decoder, const json_t *value, const Field *fie
 static void decode_element(Decoder *decoder, const json_t *value, const char *key,
                            const Field *field, void *element, const char *place) {
     Field row = *field; // of the numbers of a row
+    const bool is_unknown = json_is_null(value) && (field->flags & FIELD_NULL_IS_EMPTY) != 0;
     switch (field->kind) {
     case FIELD_KIND_REALS:
-        *(double *)element =
-            json_is_number(value) ? number_of(value) : allowed_number(&field->range);
-        if (!json_is_number(value))
+        *(double *)element = json_is_number(value) ? number_of(value)
+                             : is_unknown          ? (double)NAN
+                                                   : allowed_number(&field->range);
+        if (!json_is_number(value) && !is_unknown)
             decode_wrong_type(decoder, place, value, field, "a number");
         break;
     case FIELD_KIND_ROWS:

@@ -103,6 +103,17 @@ def check_csv(text, answer):
             assert (cell == "nan") if value is None else float(cell) == value, (row, run)
 
 
+def test_a_metric_that_does_not_vary_has_no_indices():
+    """The peak of a free vibration is its release: its indices are null, and the answer can be read."""
+    with program.daemon() as daemon:
+        base = "/v1/results/" + program.finished(daemon, program.scene("ensemble_inputs"))["result"]
+        for ending in ("json", "csv", "svg"):
+            assert daemon.get(f"{base}/ensemble.{ending}").status == 200
+        answer = daemon.get(base + "/ensemble.json").json()
+        flat = [one for one in answer["indices"] if one["metric"] == "peak_displacement"]
+        assert flat and all(one["first"] is None and one["total"] is None for one in flat), flat
+
+
 def test_the_command_prints_statistics_and_writes_all_formats():
     """`ensemble` prints means with their intervals; -o may be given again, for json, csv and svg."""
     with tempfile.TemporaryDirectory() as folder:

@@ -19,6 +19,19 @@ def asked(**study):
         "objectives": [{"metric": "rms_displacement"}], "max_candidates": 20, **study}}
 
 
+def test_variables_that_set_the_same_member_or_no_physics_are_refused():
+    """A buffer beside its restitution, the duration, a range beyond all numbers: 422 at the variable."""
+    scene = program.scene("optimize_clearance")
+    with program.daemon() as daemon:
+        for variables, place in (
+                ([{"pointer": "/dampers/0/buffer/restitution", "from": 0.3, "to": 0.8},
+                  {"pointer": "/dampers/0/buffer", "values": ["sponge", "aluminium"]}], "/study/variables/1/pointer"),
+                ([{"pointer": "/duration", "from": 1, "to": 2}], "/study/variables/0/pointer"),
+                ([{"pointer": "/dampers/0/offset", "from": -1e308, "to": 1e308}], "/study/variables/0")):
+            reply = daemon.submit({**scene, "study": {**scene["study"], "variables": variables}})
+            assert reply.status == 422 and place in {one["pointer"] for one in reply.json()["errors"]}, reply
+
+
 def test_the_best_scene_is_one_request_away_and_has_the_reported_numbers():
     with program.daemon() as daemon:
         result = program.finished(daemon, asked())["result"]

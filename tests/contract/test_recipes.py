@@ -80,7 +80,8 @@ def test_octave():
 LEFT_OUT = re.compile(r"demo\.sh|run\.sh|^cmake|^ctest|^systemctl|^man |serve|example\.org|retell\.py|bench/|tests/|"
                       r"^curl --json '\{$")
 # Which scene a line is about, where it is not the first one.
-SCENES = {"impactd ensemble": "paper_random_sponge", "impactd study": "compare_sponge", "impactd sweep": "sweep_clearance_buffer"}
+SCENES = {"impactd ensemble": "paper_random_sponge", "impactd study": "compare_sponge", "impactd sweep": "sweep_clearance_buffer",
+          "impactd optimize": "optimize_clearance", "impactd calibrate": "calibrate_free_sponge", "impactd response": "response_sponge"}
 
 
 def lines():
@@ -114,7 +115,7 @@ def test_lines():
             name = next((scene for begin, scene in SCENES.items() if line.startswith(begin)), "paper_free_sponge")
             scene = program.scene(name)
             with open(os.path.join(folder, "scene.json"), "w", encoding="utf-8") as file:
-                json.dump({**scene, "duration": min(2, scene["duration"])}, file)
+                json.dump({**scene, "duration": min(3, scene["duration"])}, file)
             is_end = re.search(r"cancel|jobs/\$JOB$", line)
             job = daemon.submit(endless(), headers={"Prefer": "respond-async"}).json()["id"] if is_end else one["id"]
             said = re.sub(r"\[\.\.\.\]", str([0.1 * i for i in range(40)]), line).replace("r-…", one["result"])

@@ -190,7 +190,7 @@ TEST(what_cannot_be_fitted_is_refused) {
     request = request_make();
     measure(&request, &request.simulation, 0.02);
     parameter_add(&request, "/duration", 1, 2);
-    assert_refused(&request, "/study/parameters/0", "cannot be fitted");
+    assert_refused(&request, "/study/parameters/0/pointer", "must be a member of the structure");
     request = request_make();
     measure(&request, &request.simulation, 0.02);
     parameter_add(&request, "/structure/mass", -1, 2);
