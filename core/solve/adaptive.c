@@ -439,7 +439,7 @@ static void adaptive_accept(Adaptive *adaptive, double length) {
     const double *sums = adaptive_data(adaptive->y) + stepping->size,
                  *before = adaptive_data(adaptive->from) + stepping->size;
     step_contact_begin(state, &stepping->contact);
-    time_stepping_scatter(state, adaptive_data(adaptive->y));
+    modal_state_scatter(state, adaptive_data(adaptive->y));
     for (size_t i = 0; i < 2 * m + 2; i++)
         stepping->integrals[i] = sums[i] - before[i];
     for (size_t d = 0; d < m; d++) {

@@ -51,13 +51,9 @@ size_t cycle_flow_size(const CycleFlow *flow) {
 
 void cycle_flow_get(const CycleFlow *flow, double *y) {
     const ModalState *state = &flow->engine.state;
-    const size_t n = state->mode_count, m = state->dampers;
-    memcpy(y, state->q, n * sizeof *y);
-    memcpy(y + n, state->p, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
-        y[2 * n + d] = state->damper[d].r + cycle_flow_origin(&state->damper[d]);
-        y[2 * n + m + d] = state->damper[d].w;
-    }
+    modal_state_gather(state, y);
+    for (size_t d = 0; d < state->dampers; d++)
+        y[2 * state->mode_count + d] += cycle_flow_origin(&state->damper[d]);
 }
 
 void cycle_flow_set(CycleFlow *flow, const double *y) {

@@ -64,26 +64,6 @@ static void linearised_motion_restore(const LinearisedMotion *motion, ModalState
     state->base_acceleration = motion->base_acceleration;
 }
 
-static void linearised_motion_load(const double *y, ModalState *state) {
-    const size_t n = state->mode_count, m = state->dampers;
-    memcpy(state->q, y, n * sizeof *y);
-    memcpy(state->p, y + n, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
-        state->damper[d].r = y[2 * n + d];
-        state->damper[d].w = y[2 * n + m + d];
-    }
-}
-
-static void linearised_motion_store(const ModalState *state, double *y) {
-    const size_t n = state->mode_count, m = state->dampers;
-    memcpy(y, state->q, n * sizeof *y);
-    memcpy(y + n, state->p, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
-        y[2 * n + d] = state->damper[d].r;
-        y[2 * n + m + d] = state->damper[d].w;
-    }
-}
-
 // Displacement of a storey as a polynomial over a step.
 static void linearised_motion_measure(LinearisedMotion *motion, size_t storey, const double *c,
                                       size_t degree, double rho, double length) {
@@ -115,10 +95,10 @@ void linearised_motion_step(LinearisedMotion *motion, ModalState *state, const T
     linearised_motion_save(motion, state);
     for (size_t i = 0; i < motion->count; i++) {
         double *y = motion->columns + i * motion->size;
-        linearised_motion_load(y, state);
+        modal_state_scatter(state, y);
         taylor_step_make(&motion->arc, state, &(Slice){0, 0, 0}, arc->length);
         taylor_step_state(&motion->arc, state, 1);
-        linearised_motion_store(state, y);
+        modal_state_gather(state, y);
     }
     linearised_motion_restore(motion, state);
 }
@@ -239,12 +219,12 @@ void linearised_motion_end_event(LinearisedMotion *motion, ModalState *state,
         double *y = motion->columns + i * motion->size;
         for (size_t k = 0; k < motion->size; k++)
             y[k] += motion->before[k] * motion->late[i];
-        linearised_motion_load(y, state);
+        modal_state_scatter(state, y);
         if (is_bounce)
             linearised_motion_collide(motion, state, true);
         if (has_stopped)
             linearised_motion_collide(motion, state, false);
-        linearised_motion_store(state, y);
+        modal_state_gather(state, y);
         for (size_t k = 0; k < motion->size; k++)
             y[k] -= motion->after[k] * motion->late[i];
     }

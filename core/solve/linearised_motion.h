@@ -1,4 +1,4 @@
-// The linearised motion beside a run of the event engine: what becomes of small changes of a state,
+// The linearised motion beside a run of the event engine: the course of small changes of a state,
 // through steps and events; and peaks and squares of the displacement between events.
 #ifndef CORE_SOLVE_LINEARISED_MOTION_H
 #define CORE_SOLVE_LINEARISED_MOTION_H

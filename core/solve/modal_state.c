@@ -61,6 +61,26 @@ double modal_state_constraint(const ModalState *state, size_t d, const double *e
     return force;
 }
 
+void modal_state_gather(const ModalState *state, double *y) {
+    const size_t n = state->mode_count, m = state->dampers;
+    memcpy(y, state->q, n * sizeof *y);
+    memcpy(y + n, state->p, n * sizeof *y);
+    for (size_t d = 0; d < m; d++) {
+        y[2 * n + d] = state->damper[d].r;
+        y[2 * n + m + d] = state->damper[d].w;
+    }
+}
+
+void modal_state_scatter(ModalState *state, const double *y) {
+    const size_t n = state->mode_count, m = state->dampers;
+    memcpy(state->q, y, n * sizeof *y);
+    memcpy(state->p, y + n, n * sizeof *y);
+    for (size_t d = 0; d < m; d++) {
+        state->damper[d].r = y[2 * n + d];
+        state->damper[d].w = y[2 * n + m + d];
+    }
+}
+
 void modal_state_forces(ModalState *state) {
     modal_state_elastic(state, state->q, state->p, state->elastic);
     if (state->residual_influence != NULL)

@@ -165,6 +165,10 @@ void modal_state_elastic(const ModalState *state, const double *q, const double 
 // As run_check, or the status of the impact log.
 Status modal_state_check(const ModalState *state, double step);
 
+// Copies the state to y, and y to the state: q and p of all modes, then r and w of all dampers.
+void modal_state_gather(const ModalState *state, double *y);
+void modal_state_scatter(ModalState *state, const double *y);
+
 // N that keeps a damper at rest on its stop [N].
 double modal_state_constraint(const ModalState *state, size_t damper, const double *elastic,
                               double ground);

@@ -175,31 +175,11 @@ Status time_stepping_note(TimeStepping *stepping, double cost) {
     return stepping->unchecked_cost > CHECK_COST ? time_stepping_check(stepping) : STATUS_OK;
 }
 
-static void time_stepping_gather(const ModalState *state, double *y) {
-    const size_t n = state->mode_count, m = state->dampers;
-    memcpy(y, state->q, n * sizeof *y);
-    memcpy(y + n, state->p, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
-        y[2 * n + d] = state->damper[d].r;
-        y[2 * n + m + d] = state->damper[d].w;
-    }
-}
-
 void time_stepping_begin(TimeStepping *stepping, double *y) {
     const ModalState *state = &stepping->state;
-    time_stepping_gather(state, y);
+    modal_state_gather(state, y);
     memset(stepping->integrals, 0, (2 * state->dampers + 2) * sizeof *stepping->integrals);
     step_contact_begin(state, &stepping->contact);
-}
-
-void time_stepping_scatter(ModalState *state, const double *y) {
-    const size_t n = state->mode_count, m = state->dampers;
-    memcpy(state->q, y, n * sizeof *y);
-    memcpy(state->p, y + n, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
-        state->damper[d].r = y[2 * n + d];
-        state->damper[d].w = y[2 * n + m + d];
-    }
 }
 
 static double time_stepping_step_cost(const TimeStepping *stepping) {
@@ -221,7 +201,7 @@ static Status time_stepping_advance(TimeStepping *stepping, double length, doubl
     time_stepping_read_base(stepping, length);
     time_stepping_begin(stepping, stepping->y);
     TRY(stepping->stepper->step(stepping, length));
-    time_stepping_scatter(state, stepping->y);
+    modal_state_scatter(state, stepping->y);
     state->offset = offset;
     state->base_acceleration = ground[2];
     impact_log_work(&state->impacts, integrals[2 * m], integrals[2 * m + 1]);

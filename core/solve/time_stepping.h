@@ -90,9 +90,8 @@ void time_stepping_rate(TimeStepping *stepping, const double *y, double ground,
                         double *restrict out);
 // `force` becomes N of the dampers that are in contact at the step's start.
 void time_stepping_forces(TimeStepping *stepping, const double *y);
-// Copies the state to y, and y to the state. A step begins with integrals of zero.
+// Copies the state to y. A step begins with integrals of zero.
 void time_stepping_begin(TimeStepping *stepping, double *y);
-void time_stepping_scatter(ModalState *state, const double *y);
 // Adds the integrals of a step from the states at its two ends: by the trapezoidal rule, or by
 // Simpson's with the middle of the cubic through both, which is of order 4.
 void time_stepping_integrate(TimeStepping *stepping, const double *from, const double *to,

@@ -37,6 +37,8 @@ typedef union StudyMetrics {
 } StudyMetrics;
 extern const Field study_metrics_fields[];
 
+// A number of a summary by its name; NAN: unknown.
+double study_summary_value(const Summary *summary, const char *name);
 const char *study_metric_unit(int metric); // NULL: none
 // Whether a run needs output.reduction for it.
 bool study_metric_is_reduction(int metric);

@@ -141,7 +141,7 @@ static const Field optimum_answer_fields[] = {
     FIELD_ITEM(Optimum, undamped, optimum_scene_fields, NULL, PRESENCE_DEFAULT, "the same scene without its dampers"),
     FIELD_LIST(Optimum, region, optimum_interval_fields, 0, PRESENCE_DEFAULT, "where each variable alone may be: the objective is within 2 % of the best and the constraints hold, as the search's model of all candidates predicts"),
     FIELD_LIST(Optimum, rivals, optimum_rival_fields, 0, PRESENCE_DEFAULT, "the next best candidates whose values differ clearly"),
-    FIELD_LIST(Optimum, front, optimum_candidate_fields, 0, PRESENCE_DEFAULT, "of two objectives: candidates that none other beats in both, by the first"),
+    FIELD_LIST(Optimum, front, optimum_candidate_fields, 0, PRESENCE_DEFAULT, "of two objectives: candidates that no other beats in both, by the first"),
     FIELD_LIST(Optimum, history, optimum_candidate_fields, 0, PRESENCE_DEFAULT, "every candidate, in their order"),
     FIELD_LIST(Optimum, failures, optimum_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
     FIELD_LIST(Optimum, warnings, warning_fields, 0, PRESENCE_DEFAULT, "what is doubtful"),

@@ -31,6 +31,7 @@
 #include <string.h>
 
 #include "core/math/student_t.h"
+#include "core/study/metrics.h"
 
 // sqrt(quantile / d) of a chi-square, relative to d = 1.
 static double stopping_rule_narrowing(double d) {

@@ -57,9 +57,6 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
         "peak_contact_force"
 #define STUDY_METRICS STUDY_METRICS_USUAL, "peak_storey_drift", "peak_base_shear"
 
-// A number of a summary by its name; NAN: unknown.
-double study_summary_value(const Summary *summary, const char *name);
-
 // Densities that a run's spectra hold; 0 without spectra.
 double study_run_densities(const Simulation *simulation);
 

@@ -17,6 +17,7 @@
 
 #include "core/base/json_pointer.h"
 #include "core/excitation/recorded_motion.h"
+#include "core/study/metrics.h"
 
 enum {
     PLACE = sizeof((Fault){0}.pointer),
