@@ -4,23 +4,13 @@
 
 #include "core/excitation/excitation.h"
 #include "core/solve/cycle_flow.h"
+#include "tests/support/flows.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 #include "tests/support/test.h"
 
 static const double TURN = 6.283185307179586;
 static Problem problem;
-
-// Completes and clears the simulation.
-static CycleFlow *flow_of(Simulation *simulation) {
-    CycleFlow *flow = NULL;
-    problem_clear(&problem);
-    if (simulation_complete(simulation, NULL, NULL, &problem) != STATUS_OK ||
-        simulation_cycle_flow(simulation, NULL, NULL, NULL, &flow, &problem) != STATUS_OK)
-        fail_msg("%s %s", problem.detail, problem.count > 0 ? problem.faults[0].pointer : "");
-    simulation_clear(simulation);
-    return flow;
-}
 
 // The paper's damper on a frame of two storeys, and another one below it.
 static void frame_scene(Simulation *simulation, double e, double contact_time, double amplitude) {

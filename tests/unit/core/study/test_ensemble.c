@@ -10,6 +10,7 @@
 #include "core/study/study.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/taken.h"
 #include "tests/support/test.h"
 
 static Problem problem;
@@ -207,19 +208,6 @@ TEST(it_tells_its_progress_and_can_be_stopped_wherever_it_is) {
         assert_int_equal(patience.asked, left + 1); // and asks no more
     }
     study_request_clear(&inquiry);
-}
-
-typedef struct Taken {
-    unsigned char *bytes;
-    size_t count;
-} Taken;
-
-static void take(void *context, const void *bytes, size_t size) {
-    Taken *taken = context;
-    taken->bytes = realloc(taken->bytes, taken->count + size);
-    assert_non_null(taken->bytes);
-    memcpy(taken->bytes + taken->count, bytes, size);
-    taken->count += size;
 }
 
 TEST(the_same_study_has_the_same_bytes_in_any_workspace) {

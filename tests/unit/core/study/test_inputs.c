@@ -11,6 +11,7 @@
 #include "core/study/ensemble.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
+#include "tests/support/taken.h"
 #include "tests/support/test.h"
 
 static Problem problem;
@@ -259,19 +260,6 @@ TEST(a_draw_without_a_valid_scene_is_a_failed_run) {
     }
     variant_free(&answer->variant);
     study_request_clear(&inquiry);
-}
-
-typedef struct Taken {
-    unsigned char *bytes;
-    size_t count;
-} Taken;
-
-static void take(void *context, const void *bytes, size_t size) {
-    Taken *taken = context;
-    taken->bytes = realloc(taken->bytes, taken->count + size);
-    assert_non_null(taken->bytes);
-    memcpy(taken->bytes + taken->count, bytes, size);
-    taken->count += size;
 }
 
 static bool count_down(void *context, double fraction) {

@@ -3,22 +3,13 @@
 
 #include "core/excitation/excitation.h"
 #include "core/study/periodic_orbit.h"
+#include "tests/support/flows.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 #include "tests/support/test.h"
 
 static const double TURN = 6.283185307179586;
 static Problem problem;
-
-static CycleFlow *flow_of(Simulation *simulation) {
-    CycleFlow *flow = NULL;
-    problem_clear(&problem);
-    if (simulation_complete(simulation, NULL, NULL, &problem) != STATUS_OK ||
-        simulation_cycle_flow(simulation, NULL, NULL, NULL, &flow, &problem) != STATUS_OK)
-        fail_msg("%s %s", problem.detail, problem.count > 0 ? problem.faults[0].pointer : "");
-    simulation_clear(simulation);
-    return flow;
-}
 
 static OrbitSearch search_of(const CycleFlow *flow) {
     OrbitSearch search;
