@@ -152,7 +152,8 @@ static Status proposal_run(App *app, const Request *request, const Material *bef
             chart_evaluation(&evaluation, slug, &bytes);
         else
             proposal_write(&bytes, request, selection, &evaluation, &proposal);
-        status = reply_bytes(reply, 200, is_chart ? chart_type : type_json, &bytes, problem);
+        status = reply_bytes(reply, 200, is_chart ? format_svg.content_type : type_json, &bytes,
+                             problem);
     }
     material_proposal_clear(&proposal);
     evaluation_clear(&evaluation);
@@ -163,7 +164,7 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     const char *slug = request->parameters[0];
     MaterialState state;
     MaterialRevision before;
-    static const ReplyFormat formats[] = {{"json", "application/json"}, {"svg", chart_type}};
+    const ReplyFormat formats[] = {{"json", type_json}, {"svg", format_svg.content_type}};
     size_t format;
     int separation;
     TRY(reply_format(request, 1, formats, COUNT(formats), reply, &format, problem));

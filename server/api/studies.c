@@ -27,14 +27,15 @@ static Status study_read_kind(const ResultRow *row, const StudyKind *kind, Study
 }
 
 // The format by the extension in the request's second parameter, else by Accept.
-static Status study_format(const Request *request, const StudyFormat *offered, Reply *reply,
-                           const StudyFormat **format, Problem *problem) {
+static Status study_format(const Request *request, const StudyKind *kind, Reply *reply,
+                           const TableFormat **format, Problem *problem) {
+    const TableFormat *const *offered = study_formats(kind->answer);
     ReplyFormat formats[STUDY_FORMATS_MAX];
     size_t count = 0, choice;
-    for (; offered[count].extension != NULL; count++)
-        formats[count] = (ReplyFormat){offered[count].extension, offered[count].content_type};
+    for (; offered[count] != NULL; count++)
+        formats[count] = (ReplyFormat){offered[count]->extension, offered[count]->content_type};
     TRY(reply_format(request, 1, formats, count, reply, &choice, problem));
-    *format = &offered[choice];
+    *format = offered[choice];
     return STATUS_OK;
 }
 
@@ -51,8 +52,8 @@ static const StudyKind *study_of_route(const Request *request) {
 
 Status results_study(App *app, const Request *request, Reply *reply, Problem *problem) {
     const StudyKind *kind = study_of_route(request);
-    const StudyFormat *format;
-    TRY(study_format(request, study_formats(kind->answer), reply, &format, problem));
+    const TableFormat *format;
+    TRY(study_format(request, kind, reply, &format, problem));
     ResultRow row = {0};
     StudyAnswer answer = {NULL};
     Bytes bytes = {.most = app->reply_most};
@@ -149,7 +150,7 @@ static void sweep_reply_free(void *context) {
 }
 
 // Takes `sent`, also when it fails.
-static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
+static Status sweep_reply_table(App *app, Reply *reply, const TableFormat *format, SweepReply *sent,
                                 Problem *problem) {
     const bool is_complete = sent->view.is_complete;
     TableStream *stream = table_stream_new(NULL);
@@ -161,13 +162,13 @@ static Status sweep_reply_table(App *app, Reply *reply, const StudyFormat *forma
     stream->is_broken = &sent->document.is_broken;
     stream->release = sweep_reply_free;
     stream->source = sent;
-    TRY(columns_reply(app, reply, format_find(format->extension), stream, problem));
+    TRY(columns_reply(app, reply, format, stream, problem));
     // As long as rows come, no part of one document fits the next.
     reply->accepts_ranges = format->is_binary && is_complete;
     return STATUS_OK;
 }
 
-static Status sweep_reply_chart(App *app, Reply *reply, const StudyFormat *format, SweepReply *sent,
+static Status sweep_reply_chart(App *app, Reply *reply, const TableFormat *format, SweepReply *sent,
                                 Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
     const bool is_whole = chart_sweep(&sent->document, &bytes);
@@ -181,8 +182,8 @@ static Status sweep_reply_chart(App *app, Reply *reply, const StudyFormat *forma
 }
 
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
-    const StudyFormat *format;
-    TRY(study_format(request, study_formats(study_sweep.answer), reply, &format, problem));
+    const TableFormat *format;
+    TRY(study_format(request, &study_sweep, reply, &format, problem));
     SweepReply *sent = calloc(1, sizeof *sent);
     if (sent == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");
@@ -198,9 +199,8 @@ Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *pro
                                      .rows = view->rows,
                                      .read = sweep_view_read,
                                      .context = view};
-    return strcmp(format->extension, "svg") == 0
-               ? sweep_reply_chart(app, reply, format, sent, problem)
-               : sweep_reply_table(app, reply, format, sent, problem);
+    return format == &format_svg ? sweep_reply_chart(app, reply, format, sent, problem)
+                                 : sweep_reply_table(app, reply, format, sent, problem);
 }
 
 static Status sweep_read_index(const Request *request, uint64_t *index, Problem *problem) {

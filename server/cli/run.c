@@ -354,9 +354,9 @@ typedef struct StudyCommand {
     FIELD_FLAG(StudySettings, json, false, "print the document, as the server sends it")
 
 // The format of a path's extension; NULL if the study has none such.
-static const StudyFormat *study_format(const StudyKind *kind, const char *path) {
+static const TableFormat *study_format(const StudyKind *kind, const char *path) {
     const char *extension = path_extension(path);
-    return extension != NULL ? study_format_find(study_formats(kind->answer), extension) : NULL;
+    return extension != NULL ? study_format_find(kind->answer, extension) : NULL;
 }
 
 static Status study_check_outputs(const StudyKind *kind, const Texts *outputs, Problem *problem) {
@@ -370,7 +370,7 @@ static Status study_check_outputs(const StudyKind *kind, const Texts *outputs, P
 }
 
 // `path` NULL: to standard output.
-static Status study_write(const StudyFormat *format, const char *path,
+static Status study_write(const TableFormat *format, const char *path,
                           const StudyDocument *document, Problem *problem) {
     Bytes bytes = {0};
     study_format_write(format, document, &bytes);
@@ -417,10 +417,9 @@ static Status study_make(const StudyRequest *request, const StudySettings *setti
     if (status == STATUS_OK && scene.is_failed)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
     const StudyDocument document = {answer, result, scene.at};
-    // The first format of every study is JSON. The document's own study prints nothing where it is
-    // written to files.
+    // The document's own study prints nothing where it is written to files.
     if (status == STATUS_OK && (settings->json || (command->view == NULL && outputs->count == 0)))
-        status = study_write(study_formats(kind->answer), NULL, &document, problem);
+        status = study_write(&format_json, NULL, &document, problem);
     else if (status == STATUS_OK && command->view != NULL)
         status = study_print(command, answer, problem);
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)

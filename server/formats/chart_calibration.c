@@ -77,24 +77,17 @@ void chart_calibration(const Variant *answer, Bytes *bytes) {
 // A row for each parameter.
 void calibration_table(const Variant *answer, StudyTable *table) {
     const Calibration *calibration = (const Calibration *)(const void *)answer;
-    table->rows = calibration->parameters.count;
-    const size_t pointer = study_table_add(table, "pointer", NULL);
-    const size_t unit = study_table_add(table, "unit", NULL);
-    const size_t value = study_table_add(table, "value", NULL);
-    const size_t error = study_table_add(table, "standard_error", NULL);
-    const size_t low = study_table_add(table, "low", NULL);
-    const size_t high = study_table_add(table, "high", NULL);
-    const size_t identifiable = study_table_add(table, "identifiable", NULL);
-    for (size_t i = 0; i < table->rows; i++) {
+    for (size_t i = 0; i < calibration->parameters.count; i++) {
         const CalibratedParameter *parameter = &calibration->parameters.at[i];
-        study_table_set_word(table, pointer, i, parameter->pointer);
-        study_table_set_word(table, unit, i, parameter->unit != NULL ? parameter->unit : "1");
-        study_table_set(table, value, i, parameter->value);
-        study_table_set(table, error, i, parameter->standard_error);
-        if (parameter->interval_95.count == 2) {
-            study_table_set(table, low, i, parameter->interval_95.at[0]);
-            study_table_set(table, high, i, parameter->interval_95.at[1]);
-        }
-        study_table_set_word(table, identifiable, i, parameter->is_identifiable ? "true" : "false");
+        const Reals *interval = &parameter->interval_95;
+        const bool has_interval = interval->count == 2;
+        study_table_row(table);
+        study_table_text(table, "pointer", parameter->pointer);
+        study_table_text(table, "unit", parameter->unit != NULL ? parameter->unit : "1");
+        study_table_number(table, "value", NULL, parameter->value);
+        study_table_number(table, "standard_error", NULL, parameter->standard_error);
+        study_table_number(table, "low", NULL, has_interval ? interval->at[0] : (double)NAN);
+        study_table_number(table, "high", NULL, has_interval ? interval->at[1] : (double)NAN);
+        study_table_text(table, "identifiable", parameter->is_identifiable ? "true" : "false");
     }
 }

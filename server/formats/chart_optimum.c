@@ -152,33 +152,21 @@ void chart_optimum(const Variant *answer, Bytes *bytes) {
 }
 
 // A row for each candidate.
-void table_optimum(const Variant *answer, StudyTable *table) {
+void optimum_table(const Variant *answer, StudyTable *table) {
     const Optimum *optimum = (const Optimum *)(const void *)answer;
     const OptimumCandidates *rows = &optimum->history;
-    static const char *const words[] = {"false", "true"};
-    table->rows = rows->count;
-    const size_t index = study_table_add(table, "index", NULL);
-    const size_t variables = rows->count > 0 ? rows->at[0].values.count : 0;
-    for (size_t j = 0; j < variables; j++)
-        (void)study_table_add(table, rows->at[0].values.at[j].pointer, NULL);
-    for (size_t k = 0; k < optimum->objectives.count; k++) {
-        const int metric = optimum->objectives.at[k].metric;
-        (void)study_table_add(table, study_metric_names[metric], study_metric_unit(metric));
-    }
-    const size_t feasible = study_table_add(table, "feasible", NULL);
     for (size_t i = 0; i < rows->count; i++) {
         const OptimumCandidate *row = &rows->at[i];
-        study_table_set(table, index, i, (double)row->index);
-        for (size_t j = 0; j < variables; j++) {
-            char *end;
-            const double number = strtod(row->values.at[j].value, &end);
-            if (*end == '\0')
-                study_table_set(table, index + 1 + j, i, number);
-            else
-                study_table_set_word(table, index + 1 + j, i, row->values.at[j].value);
+        study_table_row(table);
+        study_table_number(table, "index", NULL, (double)row->index);
+        for (size_t j = 0; j < row->values.count; j++)
+            study_table_scalar(table, row->values.at[j].pointer, row->values.at[j].value);
+        for (size_t k = 0; k < optimum->objectives.count; k++) {
+            const int metric = optimum->objectives.at[k].metric;
+            const bool is_known = k < row->objectives.count;
+            study_table_number(table, study_metric_names[metric], study_metric_unit(metric),
+                               is_known ? row->objectives.at[k] : (double)NAN);
         }
-        for (size_t k = 0; k < row->objectives.count; k++)
-            study_table_set(table, index + 1 + variables + k, i, row->objectives.at[k]);
-        study_table_set_word(table, feasible, i, words[row->feasible]);
+        study_table_text(table, "feasible", row->feasible ? "true" : "false");
     }
 }

@@ -12,8 +12,6 @@
 
 enum { SPECTRA_DRAWN = 4, VARIANTS_DRAWN = 8, READINGS_DRAWN = 5000 };
 
-const char chart_type[] = "image/svg+xml";
-
 static const double charts_edges[] = {-(double)INFINITY, (double)INFINITY};
 
 // A name with spaces for its underscores.
@@ -833,7 +831,7 @@ static bool svg_next(const Table *table, TextPlace *place, Bytes *bytes) {
 
 const TableFormat format_svg = {
     .extension = "svg",
-    .content_type = chart_type,
+    .content_type = "image/svg+xml",
     .is_binary = false,
     .next = svg_next,
 };

@@ -9,12 +9,13 @@
 
 // A cell, quoted if it must be.
 static void csv_put_text(Bytes *bytes, const char *text, size_t length) {
-    char cell[256];
-    snprintf(cell, sizeof cell, "%.*s", (int)length, text);
-    if (strpbrk(cell, ",\"\n\r") == NULL)
-        bytes_put(bytes, text, length);
+    bool is_quoted = false;
+    for (size_t i = 0; i < length; i++)
+        is_quoted = is_quoted || strchr(",\"\n\r", text[i]) != NULL;
+    if (is_quoted)
+        csv_cells_text(bytes, text, length);
     else
-        csv_cells_text(bytes, cell);
+        bytes_put(bytes, text, length);
 }
 
 static void csv_put_title(Bytes *bytes, const char *name, const char *unit) {

@@ -101,53 +101,33 @@ static void response_add_sections(Chart *chart, const ResponseCurve *curve, cons
                    chart_text(chart, "Drawn is one of %zu points of the sections", step));
 }
 
+static const char *response_direction(int direction) {
+    return direction == CURVE_UP ? "up" : direction == CURVE_DOWN ? "down" : "continued";
+}
+
 void response_curve_table(const Variant *answer, StudyTable *table) {
-    static const char *const names[] = {"index",
-                                        "branch",
-                                        "value",
-                                        "direction",
-                                        "period",
-                                        "stable",
-                                        "impacts_per_period",
-                                        "largest_multiplier",
-                                        "peak_displacement",
-                                        "rms_displacement",
-                                        "undamped_peak_displacement",
-                                        "lyapunov"};
     const ResponseCurve *curve = (const ResponseCurve *)(const void *)answer;
-    size_t columns[COUNT(names)];
-    table->rows = curve->points.count;
-    for (size_t i = 0; i < COUNT(names); i++) {
-        const Field *row = fields_find(response_point_fields, names[i], NULL);
-        columns[i] = study_table_add(table, names[i],
-                                     i == 2        ? curve->unit
-                                     : row != NULL ? row->unit
-                                                   : NULL);
-    }
-    for (size_t k = 0; k < table->rows && !table->is_failed; k++) {
+    for (size_t k = 0; k < curve->points.count; k++) {
         const ResponsePoint *point = &curve->points.at[k];
         const bool is_periodic = point->period != COUNT_ABSENT;
-        const double *first = point->multipliers.count > 0 ? point->multipliers.at[0].at : NULL;
         const double unknown = (double)NAN;
-        const double values[] = {(double)point->index,
-                                 (double)point->branch,
-                                 point->value,
-                                 unknown,
-                                 is_periodic ? (double)point->period : unknown,
-                                 is_periodic ? (double)point->stable : unknown,
-                                 is_periodic ? (double)point->impacts_per_period : unknown,
-                                 first != NULL ? hypot(first[0], first[1]) : unknown,
-                                 point->peak_displacement,
-                                 point->rms_displacement,
-                                 point->undamped_peak_displacement,
-                                 point->lyapunov};
-        for (size_t i = 0; i < COUNT(names); i++)
-            if (i != 3)
-                study_table_set(table, columns[i], k, values[i]);
-        study_table_set_word(table, columns[3], k,
-                             point->direction == CURVE_UP     ? "up"
-                             : point->direction == CURVE_DOWN ? "down"
-                                                              : "continued");
+        const double *first = point->multipliers.count > 0 ? point->multipliers.at[0].at : NULL;
+        study_table_row(table);
+        study_table_number(table, "index", NULL, (double)point->index);
+        study_table_number(table, "branch", NULL, (double)point->branch);
+        study_table_number(table, "value", curve->unit, point->value);
+        study_table_text(table, "direction", response_direction(point->direction));
+        study_table_number(table, "period", NULL, is_periodic ? (double)point->period : unknown);
+        study_table_number(table, "stable", NULL, is_periodic ? (double)point->stable : unknown);
+        study_table_number(table, "impacts_per_period", NULL,
+                           is_periodic ? (double)point->impacts_per_period : unknown);
+        study_table_number(table, "largest_multiplier", NULL,
+                           first != NULL ? hypot(first[0], first[1]) : unknown);
+        study_table_number(table, "peak_displacement", "m", point->peak_displacement);
+        study_table_number(table, "rms_displacement", "m", point->rms_displacement);
+        study_table_number(table, "undamped_peak_displacement", "m",
+                           point->undamped_peak_displacement);
+        study_table_number(table, "lyapunov", "1/s", point->lyapunov);
     }
 }
 

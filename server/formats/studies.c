@@ -9,75 +9,63 @@
 #include "core/study/model_comparison.h"
 #include "core/study/sensitivity.h"
 #include "server/jobs/documents.h"
-#include "server/util/csv.h"
 
 // A row for each seed, with the drawn inputs.
-static void ensemble_csv(const Variant *answer, Bytes *bytes) {
+static void ensemble_table(const Variant *answer, StudyTable *table) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
-    const double unknown = (double)NAN;
-    bytes_text(bytes, "seed,steps");
-    csv_cells_header(bytes, NULL, summary_fields);
-    for (size_t i = 0; i < ensemble->inputs.count; i++) {
-        const char *unit = ensemble->inputs.at[i].unit;
-        bytes_format(bytes, ",%s%s%s%s", ensemble->inputs.at[i].pointer, unit != NULL ? " [" : "",
-                     unit != NULL ? unit : "", unit != NULL ? "]" : "");
-    }
-    bytes_text(bytes, ",why\n");
     for (size_t i = 0; i < ensemble->table.count; i++) {
         const RunRecord *run = &ensemble->table.at[i];
-        bytes_format(bytes, "%llu", (unsigned long long)run->number);
-        csv_cells_reals(bytes, &run->steps, 1);
-        csv_cells_members(bytes, summary_fields, &run->summary);
+        study_table_row(table);
+        study_table_number(table, "seed", NULL, (double)run->number);
+        study_table_number(table, "steps", NULL, run->steps);
+        study_table_members(table, NULL, summary_fields, &run->summary);
         for (size_t k = 0; k < ensemble->inputs.count; k++)
-            csv_cells_reals(bytes, k < run->inputs.count ? &run->inputs.at[k] : &unknown, 1);
-        bytes_text(bytes, ",");
-        csv_cells_text(bytes, run->why);
-        bytes_text(bytes, "\n");
+            study_table_number(table, ensemble->inputs.at[k].pointer, ensemble->inputs.at[k].unit,
+                               k < run->inputs.count ? run->inputs.at[k] : (double)NAN);
+        study_table_text(table, "why", run->why);
     }
 }
 
 // A row for each variant, with k_b and c_b of its first stop.
-static void compare_csv(const Variant *answer, Bytes *bytes) {
+static void compare_table(const Variant *answer, StudyTable *table) {
     const Comparison *comparison = (const Comparison *)(const void *)answer;
-    bytes_text(bytes, "model,separation,status,stiffness,damping [N s/m],steps");
-    csv_cells_header(bytes, NULL, summary_fields);
-    csv_cells_header(bytes, "contacts", compare_contacts_fields);
-    csv_cells_header(bytes, "difference", compare_differences_fields);
-    csv_cells_header(bytes, "psd", spectrum_distance_fields);
-    csv_cells_header(bytes, "displacement", signal_comparison_fields);
-    bytes_text(bytes, ",divergence [s],why\n");
     for (size_t i = 0; i < comparison->entries.count; i++) {
         const CompareEntry *entry = &comparison->entries.at[i];
-        const DerivedList *derived = &entry->derived;
-        const double numbers[] = {derived->count > 0 ? derived->at[0].stiffness : (double)NAN,
-                                  derived->count > 0 ? derived->at[0].damping : (double)NAN,
-                                  entry->steps};
-        bytes_format(bytes, "%s,%s,%s", entry->contact_model,
-                     entry->separation != CHOICE_ABSENT ? separation_names[entry->separation] : "",
-                     compare_status_names[entry->status]);
-        csv_cells_reals(bytes, numbers, COUNT(numbers));
-        csv_cells_members(bytes, summary_fields, &entry->summary);
-        csv_cells_members(bytes, compare_contacts_fields, &entry->contacts);
-        csv_cells_members(bytes, compare_differences_fields, &entry->differences);
-        csv_cells_members(bytes, spectrum_distance_fields, &entry->psd);
-        csv_cells_members(bytes, signal_comparison_fields, &entry->displacement);
-        csv_cells_reals(bytes, &entry->divergence.time, 1);
-        bytes_text(bytes, ",");
-        csv_cells_text(bytes, entry->why);
-        bytes_text(bytes, "\n");
+        const bool has_stop = entry->derived.count > 0;
+        const bool has_separation = entry->separation != CHOICE_ABSENT;
+        study_table_row(table);
+        study_table_text(table, "model", entry->contact_model);
+        study_table_text(table, "separation",
+                         has_separation ? separation_names[entry->separation] : NULL);
+        study_table_text(table, "status", compare_status_names[entry->status]);
+        study_table_number(table, "stiffness", NULL,
+                           has_stop ? entry->derived.at[0].stiffness : (double)NAN);
+        study_table_number(table, "damping", "N s/m",
+                           has_stop ? entry->derived.at[0].damping : (double)NAN);
+        study_table_number(table, "steps", NULL, entry->steps);
+        study_table_members(table, NULL, summary_fields, &entry->summary);
+        study_table_members(table, "contacts", compare_contacts_fields, &entry->contacts);
+        study_table_members(table, "difference", compare_differences_fields, &entry->differences);
+        study_table_members(table, "psd", spectrum_distance_fields, &entry->psd);
+        study_table_members(table, "displacement", signal_comparison_fields, &entry->displacement);
+        study_table_number(table, "divergence", "s", entry->divergence.time);
+        study_table_text(table, "why", entry->why);
     }
 }
 
-static void sensitivity_csv_row(Bytes *bytes, const char *parameter, const char *statistic,
-                                double value, double derivative, double spread, bool is_settled) {
-    const double numbers[] = {value, derivative, spread};
-    bytes_format(bytes, "%s,%s", parameter, statistic);
-    csv_cells_reals(bytes, numbers, COUNT(numbers));
-    bytes_format(bytes, ",%s\n", is_settled ? "true" : "false");
+static void sensitivity_add(StudyTable *table, const char *parameter, const char *statistic,
+                            double value, double derivative, double spread, bool is_settled) {
+    study_table_row(table);
+    study_table_text(table, "parameter", parameter);
+    study_table_text(table, "statistic", statistic);
+    study_table_number(table, "value", NULL, value);
+    study_table_number(table, "derivative", NULL, derivative);
+    study_table_number(table, "spread", NULL, spread);
+    study_table_text(table, "is_settled", is_settled ? "true" : "false");
 }
 
 // The closed forms of k_b and c_b of a stop.
-static void sensitivity_csv_stop(Bytes *bytes, const SensitivityStop *stop) {
+static void sensitivity_add_stop(StudyTable *table, const SensitivityStop *stop) {
     const struct {
         const char *parameter, *what;
         double value, derivative;
@@ -93,25 +81,42 @@ static void sensitivity_csv_stop(Bytes *bytes, const SensitivityStop *stop) {
         char statistic[64];
         snprintf(statistic, sizeof statistic, "%s %llu %s", rows[i].what,
                  (unsigned long long)stop->damper, side_names[stop->side]);
-        sensitivity_csv_row(bytes, rows[i].parameter, statistic, rows[i].value, rows[i].derivative,
-                            0, !isnan(rows[i].derivative));
+        sensitivity_add(table, rows[i].parameter, statistic, rows[i].value, rows[i].derivative, 0,
+                        !isnan(rows[i].derivative));
     }
 }
 
 // A row for each parameter and statistic, stops first. The drawn runs are in the JSON alone.
-static void sensitivity_csv(const Variant *answer, Bytes *bytes) {
+static void sensitivity_table(const Variant *answer, StudyTable *table) {
     const Sensitivity *sensitivity = (const Sensitivity *)(const void *)answer;
-    bytes_text(bytes, "parameter,statistic,value,derivative,spread,is_settled\n");
     for (size_t i = 0; i < sensitivity->contact.count; i++)
         if (sensitivity->contact.at[i].why == NULL)
-            sensitivity_csv_stop(bytes, &sensitivity->contact.at[i]);
+            sensitivity_add_stop(table, &sensitivity->contact.at[i]);
     for (size_t i = 0; i < sensitivity->response.count; i++) {
         const SensitivityRow *row = &sensitivity->response.at[i];
         for (size_t k = 0; k < row->slopes.count; k++) {
             const SensitivitySlope *slope = &row->slopes.at[k];
-            sensitivity_csv_row(bytes, sensitivity_parameter_names[row->parameter],
-                                statistics_metric_names[slope->metric], slope->value,
-                                slope->derivative, slope->spread, slope->is_settled);
+            sensitivity_add(table, sensitivity_parameter_names[row->parameter],
+                            statistics_metric_names[slope->metric], slope->value, slope->derivative,
+                            slope->spread, slope->is_settled);
+        }
+    }
+}
+
+// A row for each run.
+static void fragility_table(const Variant *variant, StudyTable *table) {
+    const Fragility *answer = (const Fragility *)(const void *)variant;
+    for (size_t r = 0; r < answer->curves.count; r++) {
+        const FragilityCurve *curve = &answer->curves.at[r];
+        for (size_t l = 0; l < curve->points.count; l++) {
+            const FragilityPoint *point = &curve->points.at[l];
+            study_table_row(table);
+            study_table_text(table, "record", curve->record);
+            study_table_number(table, "level", "m/s^2", point->level);
+            for (int m = 0; m < STUDY_METRIC_COUNT; m++)
+                if (!study_metric_is_reduction(m))
+                    study_table_number(table, study_metric_names[m], study_metric_unit(m),
+                                       point->metrics.of[m]);
         }
     }
 }
@@ -122,140 +127,83 @@ static void sweep_chart(const Variant *answer, Bytes *bytes) {
     (void)chart_sweep(&document, bytes);
 }
 
-// A row for each run.
-static void fragility_table(const Variant *variant, StudyTable *table) {
-    const Fragility *answer = (const Fragility *)(const void *)variant;
-    size_t columns[STUDY_METRIC_COUNT], row = 0;
-    for (size_t r = 0; r < answer->curves.count; r++)
-        table->rows += answer->curves.at[r].points.count;
-    const size_t record = study_table_add(table, "record", NULL),
-                 level = study_table_add(table, "level", "m/s^2");
-    for (int m = 0; m < STUDY_METRIC_COUNT; m++)
-        if (!study_metric_is_reduction(m))
-            columns[m] = study_table_add(table, study_metric_names[m], study_metric_unit(m));
-    for (size_t r = 0; r < answer->curves.count; r++) {
-        const FragilityCurve *curve = &answer->curves.at[r];
-        for (size_t l = 0; l < curve->points.count; l++, row++) {
-            study_table_set_word(table, record, row, curve->record);
-            study_table_set(table, level, row, curve->points.at[l].level);
-            for (int m = 0; m < STUDY_METRIC_COUNT; m++)
-                if (!study_metric_is_reduction(m))
-                    study_table_set(table, columns[m], row, curve->points.at[l].metrics.of[m]);
-        }
-    }
-}
+static const TableFormat *const json_only[] = {&format_json, NULL};
+static const TableFormat *const with_chart[] = {&format_json, &format_svg, NULL};
+static const TableFormat *const with_table[] = {&format_json, &format_csv, &format_npz, &format_svg,
+                                                NULL};
 
-static const char csv_type[] = "text/csv; charset=utf-8";
-
-static const struct {
+typedef struct AnswerFormats {
     const StudyKind *study;
-    void (*table)(const Variant *answer, StudyTable *table); // of csv and the like; NULL: own ones
-    StudyFormat formats[STUDY_FORMATS_MAX];                  // ended by one without extension
-} all[] = {
-    {&study_tradeoff,
-     NULL,
-     {{"json", "application/json", false, NULL}, {"svg", chart_type, false, chart_tradeoff}}},
-    {&study_ensemble,
-     NULL,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, ensemble_csv},
-      {"svg", chart_type, false, chart_ensemble}}},
-    {&study_sweep,
-     NULL,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, NULL},
-      {"npy", "application/x-npy", true, NULL},
-      {"npz", "application/x-npz", true, NULL},
-      {"mat", "application/x-matlab-data", true, NULL},
-      {"svg", chart_type, false, sweep_chart}}},
-    {&study_compare,
-     NULL,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, compare_csv},
-      {"svg", chart_type, false, chart_compare}}},
-    {&study_response,
-     response_curve_table,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, NULL},
-      {"npz", "application/x-npz", true, NULL},
-      {"svg", chart_type, false, chart_response}}},
-    {&study_sensitivity,
-     NULL,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, sensitivity_csv},
-      {"svg", chart_type, false, chart_sensitivity}}},
-    {&study_fragility,
-     fragility_table,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, NULL},
-      {"npz", "application/x-npz", true, NULL},
-      {"svg", chart_type, false, chart_fragility}}},
-    {&study_calibrate,
-     calibration_table,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, NULL},
-      {"npz", "application/x-npz", true, NULL},
-      {"svg", chart_type, false, chart_calibration}}},
-    {&study_optimize,
-     table_optimum,
-     {{"json", "application/json", false, NULL},
-      {"csv", csv_type, false, NULL},
-      {"npz", "application/x-npz", true, NULL},
-      {"svg", chart_type, false, chart_optimum}}},
-    {NULL, NULL, {{"json", "application/json", false, NULL}}}, // of any other
+    const TableFormat *const *formats;
+    void (*table)(const Variant *answer, StudyTable *table); // NULL: none, or one of its own
+    void (*chart)(const Variant *answer, Bytes *bytes);
+} AnswerFormats;
+
+static const AnswerFormats all[] = {
+    {&study_tradeoff, with_chart, NULL, chart_tradeoff},
+    {&study_ensemble, with_table, ensemble_table, chart_ensemble},
+    {&study_sweep, table_formats, NULL, sweep_chart},
+    {&study_compare, with_table, compare_table, chart_compare},
+    {&study_response, with_table, response_curve_table, chart_response},
+    {&study_sensitivity, with_table, sensitivity_table, chart_sensitivity},
+    {&study_fragility, with_table, fragility_table, chart_fragility},
+    {&study_calibrate, with_table, calibration_table, chart_calibration},
+    {&study_optimize, with_table, optimum_table, chart_optimum},
+    {NULL, json_only, NULL, NULL}, // of any other
 };
 
 // The row of a kind of answers; the last one if it has none.
-static size_t study_format_row(const Kind *kind) {
+static const AnswerFormats *answer_formats(const Kind *kind) {
     size_t i = 0;
     while (i + 1 < COUNT(all) && all[i].study->answer != kind)
         i++;
-    return i;
+    return &all[i];
 }
 
-const StudyFormat *study_formats(const Kind *kind) {
-    return all[study_format_row(kind)].formats;
+const TableFormat *const *study_formats(const Kind *kind) {
+    return answer_formats(kind)->formats;
 }
 
-const StudyFormat *study_format_find(const StudyFormat *formats, const char *extension) {
-    while (formats->extension != NULL && strcmp(formats->extension, extension) != 0)
+const TableFormat *study_format_find(const Kind *kind, const char *extension) {
+    const TableFormat *const *formats = study_formats(kind);
+    while (*formats != NULL && strcmp((*formats)->extension, extension) != 0)
         formats++;
-    return formats->extension != NULL ? formats : NULL;
+    return *formats;
 }
 
-static void study_format_table(const StudyFormat *format, const Table *table, Bytes *bytes) {
-    if (format_write(format_find(format->extension), table, bytes, NULL) != STATUS_OK)
+static void study_format_table(const TableFormat *format, const Table *table, Bytes *bytes) {
+    if (format_write(format, table, bytes, NULL) != STATUS_OK)
         bytes->is_failed = true;
 }
 
-void study_format_write(const StudyFormat *format, const StudyDocument *document, Bytes *bytes) {
+void study_format_write(const TableFormat *format, const StudyDocument *document, Bytes *bytes) {
     const Variant *answer = document->answer;
-    const size_t row = study_format_row(answer->kind);
-    if (format->write != NULL) {
-        format->write(answer, bytes);
+    const AnswerFormats *own = answer_formats(answer->kind);
+    if (format == &format_svg) {
+        own->chart(answer, bytes);
     } else if (answer->kind == study_sweep.answer) {
         SweepDocument sweep = sweep_document((const Sweep *)(const void *)answer);
         const Table table = sweep_document_table(&sweep);
         study_format_table(format, &table, bytes);
-    } else if (all[row].table != NULL && strcmp(format->extension, "json") != 0) {
-        StudyTable columns = {.rows = 0};
-        all[row].table(answer, &columns);
-        const TableSource source = study_table_source(&columns);
-        const Table table = study_table_view(&columns, &source);
-        study_format_table(format, &table, bytes);
-        bytes->is_failed = bytes->is_failed || columns.is_failed;
-        study_table_clear(&columns);
-    } else {
+    } else if (format == &format_json) {
         document_study(bytes, document);
+    } else {
+        StudyTable rows = {.rows = 0};
+        own->table(answer, &rows);
+        const TableSource source = study_table_source(&rows);
+        const Table table = study_table_view(&rows, &source);
+        study_format_table(format, &table, bytes);
+        bytes->is_failed = bytes->is_failed || rows.is_failed;
+        study_table_clear(&rows);
     }
 }
 
-void study_formats_names(const StudyFormat *formats, const char *before, char *target,
+void study_formats_names(const TableFormat *const *formats, const char *before, char *target,
                          size_t size) {
     *target = '\0';
-    for (; formats->extension != NULL; formats++) {
+    for (; *formats != NULL; formats++) {
         char name[16];
-        snprintf(name, sizeof name, "%.4s%.8s", before, formats->extension);
+        snprintf(name, sizeof name, "%.4s%.8s", before, (*formats)->extension);
         text_list(target, size, name);
     }
 }

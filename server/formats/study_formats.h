@@ -8,41 +8,41 @@
 #include "server/formats/format.h"
 #include "server/jobs/documents.h"
 
-enum { STUDY_FORMATS_MAX = 7 }; // at most, with the end
+enum { STUDY_FORMATS_MAX = 6 };
 
-typedef struct StudyFormat {
-    const char *extension; // "svg"; NULL: the end
-    const char *content_type;
-    bool is_binary; // Range requests make sense
-    // Appends the whole document; NULL: JSON, or that of the format of the answer's table.
-    void (*write)(const Variant *answer, Bytes *bytes);
-} StudyFormat;
-
-// All formats of an answer of this kind, json first.
-const StudyFormat *study_formats(const Kind *kind);
-const StudyFormat *study_format_find(const StudyFormat *formats, const char *extension);
+// All formats of an answer of this kind, json first; NULL-terminated.
+const TableFormat *const *study_formats(const Kind *kind);
+// NULL if there is none of this extension.
+const TableFormat *study_format_find(const Kind *kind, const char *extension);
 // Appends the whole document.
-void study_format_write(const StudyFormat *format, const StudyDocument *document, Bytes *bytes);
+void study_format_write(const TableFormat *format, const StudyDocument *document, Bytes *bytes);
 
 // "json, svg", each behind `before`.
-void study_formats_names(const StudyFormat *formats, const char *before, char *target, size_t size);
+void study_formats_names(const TableFormat *const *formats, const char *before, char *target,
+                         size_t size);
 
 // --- tables of answers ---
 
-// Columns of numbers and of words, filled cell by cell. All zero is empty; once it failed (memory)
-// it stays so.
+// Rows of numbers and texts, written cell by cell. The cells of the first row make the columns; all
+// rows have the same ones. All zero is empty; once it failed (memory) it stays so.
 typedef struct StudyTable {
-    size_t rows; // set before the first column
-    struct StudyColumn *at;
-    size_t count;
+    struct StudyColumn *columns;
+    size_t width, rows, room;
+    size_t cell; // of the last row: the next one
     bool is_failed;
 } StudyTable;
 
-// Adds a column of unknown numbers (NAN) and returns its index. The name is copied.
-size_t study_table_add(StudyTable *table, const char *name, const char *unit);
-void study_table_set(StudyTable *table, size_t column, size_t row, double value);
-// Of a column that has words alone, without quotes or commas; the word is borrowed.
-void study_table_set_word(StudyTable *table, size_t column, size_t row, const char *word);
+void study_table_row(StudyTable *table); // begins the next row
+// The name is copied; an unknown number is NAN.
+void study_table_number(StudyTable *table, const char *name, const char *unit, double value);
+// Copied, too; an unknown one is NULL.
+void study_table_text(StudyTable *table, const char *name, const char *text);
+// A JSON scalar; where all of a column are numbers, it is one of numbers in binary formats.
+void study_table_scalar(StudyTable *table, const char *name, const char *json);
+// A number for each REAL and COUNT row of `fields`, its name behind `before` and a dot, where
+// given.
+void study_table_members(StudyTable *table, const char *before, const Field *fields,
+                         const void *item);
 TableSource study_table_source(StudyTable *table);                          // borrows it
 Table study_table_view(const StudyTable *table, const TableSource *source); // borrows both
 void study_table_clear(StudyTable *table);
@@ -78,7 +78,6 @@ Table sweep_document_table(SweepDocument *document);
 
 // --- charts: SVG documents, appended; what a chart does not show is named in its description ---
 
-extern const char chart_type[]; // "image/svg+xml"
 // Error against CPU time, both logarithmic (a work-precision chart).
 void chart_tradeoff(const Variant *answer, Bytes *bytes);
 // The mean spectra with the intervals of the means, and the statistics with intervals and spread.
@@ -98,7 +97,7 @@ void chart_calibration(const Variant *answer, Bytes *bytes);
 void calibration_table(const Variant *answer, StudyTable *table);
 // The candidates with the best so far, or of two objectives with the front.
 void chart_optimum(const Variant *answer, Bytes *bytes);
-void table_optimum(const Variant *answer, StudyTable *table);
+void optimum_table(const Variant *answer, StudyTable *table);
 // Each metric of a sweep: a line over one axis, or a map over two. Size and memory are limited for
 // any number of points. False: the rows could not be read to their end.
 bool chart_sweep(const SweepDocument *document, Bytes *bytes);

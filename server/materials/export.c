@@ -64,7 +64,7 @@ static void export_cell(Bytes *bytes, const char *text, bool is_json) {
     if (is_json)
         text = safe.at != NULL ? safe.at : "";
     if (text[0] == '\0' || strpbrk(text, ",\"\r\n") != NULL || text[0] == ' ' || text[0] == '\t')
-        csv_cells_text(bytes, text);
+        csv_cells_text(bytes, text, strlen(text));
     else
         bytes_text(bytes, text);
     bytes->is_failed = bytes->is_failed || json.is_failed || safe.is_failed;

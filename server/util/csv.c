@@ -10,19 +10,6 @@ void csv_put_name(Bytes *bytes, const char *name, const char *unit) {
         bytes_format(bytes, " [%s]", unit);
 }
 
-static bool csv_is_number(const Field *field) {
-    return field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_COUNT;
-}
-
-void csv_cells_header(Bytes *bytes, const char *before, const Field *fields) {
-    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        if (!csv_is_number(field))
-            continue;
-        bytes_format(bytes, ",%s%s", before != NULL ? before : "", before != NULL ? "." : "");
-        csv_put_name(bytes, field->name, field->unit);
-    }
-}
-
 void csv_cells_real(Bytes *bytes, double value) {
     if (isfinite(value))
         bytes_real(bytes, value);
@@ -30,34 +17,10 @@ void csv_cells_real(Bytes *bytes, double value) {
         bytes_text(bytes, isnan(value) ? "nan" : value < 0 ? "-inf" : "inf");
 }
 
-void csv_cells_reals(Bytes *bytes, const double *values, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        bytes_text(bytes, ",");
-        csv_cells_real(bytes, values[i]);
-    }
-}
-
-void csv_cells_members(Bytes *bytes, const Field *fields, const void *item) {
-    for (const Field *field = fields; field->kind != FIELD_KIND_END; field++) {
-        const void *member = (const char *)item + field->offset;
-        if (!csv_is_number(field))
-            continue;
-        bytes_text(bytes, ",");
-        if (field->kind == FIELD_KIND_REAL)
-            csv_cells_real(bytes, *(const double *)member);
-        else if (*(const uint64_t *)member == COUNT_ABSENT)
-            bytes_text(bytes, "nan");
-        else
-            bytes_format(bytes, "%llu", (unsigned long long)*(const uint64_t *)member);
-    }
-}
-
-void csv_cells_text(Bytes *bytes, const char *text) {
-    if (text == NULL)
-        return;
+void csv_cells_text(Bytes *bytes, const char *text, size_t length) {
     bytes_text(bytes, "\"");
-    for (; *text != '\0'; text++)
-        bytes_put(bytes, *text == '"' ? "\"\"" : text, *text == '"' ? 2 : 1);
+    for (size_t i = 0; i < length; i++)
+        bytes_put(bytes, text[i] == '"' ? "\"\"" : &text[i], text[i] == '"' ? 2 : 1);
     bytes_text(bytes, "\"");
 }
 

@@ -7,16 +7,8 @@
 
 void csv_put_name(Bytes *bytes, const char *name, const char *unit); // "name [unit]"
 
-// ",name [unit]" for each REAL and COUNT row; `before` (NULL: none) and a dot are in front of each.
-void csv_cells_header(Bytes *bytes, const char *before, const Field *fields);
-
-// "," and the number for each REAL and COUNT row; "nan" where it is unknown.
-void csv_cells_members(Bytes *bytes, const Field *fields, const void *item);
-
-void csv_cells_real(Bytes *bytes, double value); // "nan", "inf" and "-inf" too
-// "," and the number for each.
-void csv_cells_reals(Bytes *bytes, const double *values, size_t count);
-void csv_cells_text(Bytes *bytes, const char *text); // quoted, its quotes doubled; NULL: nothing
+void csv_cells_real(Bytes *bytes, double value);                    // "nan", "inf" and "-inf" too
+void csv_cells_text(Bytes *bytes, const char *text, size_t length); // quoted, its quotes doubled
 
 enum { CSV_CELLS_MAX = 1000 };
 

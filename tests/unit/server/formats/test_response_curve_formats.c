@@ -24,7 +24,7 @@ TEST(a_point_is_a_row_of_the_table) {
     points[0].index = 0;
     points[0].impacts_per_period = 2;
     const ResponseCurve curve = {.variant = {study_response.answer}, .points = {points, 2}};
-    const StudyFormat *csv = study_format_find(study_formats(study_response.answer), "csv");
+    const TableFormat *csv = study_format_find(study_response.answer, "csv");
     Bytes bytes = {0};
     study_format_write(csv, &(StudyDocument){.answer = &curve.variant}, &bytes);
     assert_false(bytes.is_failed);

@@ -1,17 +1,17 @@
-
-
 #include <string.h>
 
 #include "core/study/ensemble.h"
+#include "core/study/optimize.h"
 #include "server/formats/study_formats.h"
 #include "tests/support/test.h"
 
 static char unstable[] = "the \"numbers\" grew";
 
-static const StudyFormat *format(const StudyKind *kind, const char *extension) {
-    const StudyFormat *found = study_format_find(study_formats(kind->answer), extension);
+static void write(const Variant *answer, const char *extension, Bytes *bytes) {
+    const TableFormat *found = study_format_find(answer->kind, extension);
     assert_non_null(found);
-    return found;
+    study_format_write(found, &(StudyDocument){.answer = answer}, bytes);
+    assert_false(bytes->is_failed);
 }
 
 TEST(a_run_that_failed_is_quoted_in_the_table) {
@@ -20,9 +20,9 @@ TEST(a_run_that_failed_is_quoted_in_the_table) {
     runs[0].summary.trust_horizon = (double)NAN;
     runs[0].summary.rms_displacement = 0.1;
     assert_int_equal(fields_default(summary_fields, &runs[1].summary), STATUS_OK);
-    const Ensemble ensemble = {.table = {runs, 2}};
+    const Ensemble ensemble = {.variant = {study_ensemble.answer}, .table = {runs, 2}};
     Bytes bytes = {0};
-    format(&study_ensemble, "csv")->write(&ensemble.variant, &bytes);
+    write(&ensemble.variant, "csv", &bytes);
     assert_string_equal(
         bytes.at,
         "seed,steps,peak_displacement [m],rms_displacement [m],peak_acceleration [m/s^2],"
@@ -33,13 +33,35 @@ TEST(a_run_that_failed_is_quoted_in_the_table) {
     bytes_clear(&bytes);
 }
 
+TEST(a_word_of_a_candidate_is_the_text_itself) {
+    char clearance[] = "/dampers/0/clearance", buffer[] = "/dampers/0/buffer";
+    char near[] = "0.01", far[] = "2e-2", sponge[] = "\"sponge@1\"",
+         rubber[] = "\"rubber, soft@2\"";
+    OptimumValue values[2][2] = {
+        {{.pointer = clearance, .value = near}, {.pointer = buffer, .value = sponge}},
+        {{.pointer = clearance, .value = far}, {.pointer = buffer, .value = rubber}}};
+    double rms[] = {0.003};
+    OptimumCandidate history[] = {
+        {.index = 0, .values = {values[0], 2}, .objectives = {rms, 1}, .feasible = true},
+        {.index = 1, .values = {values[1], 2}}}; // has failed
+    OptimizeObjective objective = {.metric = 1};
+    const Optimum optimum = {
+        .variant = {study_optimize.answer}, .objectives = {&objective, 1}, .history = {history, 2}};
+    Bytes csv = {0};
+    write(&optimum.variant, "csv", &csv);
+    assert_string_equal(
+        csv.at, "index,/dampers/0/clearance,/dampers/0/buffer,rms_displacement [m],feasible\n"
+                "0,0.01,sponge@1,0.003,true\n"
+                "1,2e-2,\"rubber, soft@2\",nan,false\n");
+    bytes_clear(&csv);
+}
+
 TEST(a_chart_of_nothing_known_is_whole) {
     Variant *answer = variant_new(study_ensemble.answer);
     assert_non_null(answer);
     ((Ensemble *)(void *)answer)->confidence = 0.95;
     Bytes bytes = {0};
-    format(&study_ensemble, "svg")->write(answer, &bytes);
-    assert_false(bytes.is_failed);
+    write(answer, "svg", &bytes);
     assert_null(strstr(bytes.at, "nan"));
     assert_null(strstr(bytes.at, "inf"));
     assert_non_null(strstr(bytes.at, "not known"));

@@ -31,7 +31,7 @@ static Sweep sweep_make(void) {
 TEST(rows_that_are_there_are_in_the_table_with_their_status) {
     const Sweep sweep = sweep_make();
     Bytes bytes = {0};
-    study_format_write(study_format_find(study_formats(study_sweep.answer), "csv"),
+    study_format_write(study_format_find(study_sweep.answer, "csv"),
                        &(StudyDocument){.answer = (const Variant *)(const void *)&sweep}, &bytes);
     assert_string_equal(bytes.at,
                         "index,/dampers/0/clearance [m],/dampers/0/buffer,rms_displacement "
