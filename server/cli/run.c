@@ -1,10 +1,11 @@
-// impactd run, check, study, tradeoff, ensemble and sweep: what the server does with a scene,
+// impactd run, check, study and the commands of single studies: what the server does with a scene,
 // without a server. The scene is validated and completed as there, so that equal scenes have equal
 // results by number and by id.
 #include <stdio.h>
 #include <string.h>
 
 #include "core/study/ensemble.h"
+#include "core/study/optimize.h"
 #include "core/study/study.h"
 #include "core/study/sweep.h"
 #include "core/study/tradeoff.h"
@@ -322,7 +323,7 @@ const Command command_check = {
     .run = check,
 };
 
-// Of all four commands; each has rows for its own members.
+// Of all these commands; each has rows for its own members.
 typedef struct StudySettings {
     const Command *command;
     Texts output;
@@ -417,14 +418,15 @@ static Status study_make(const StudyRequest *request, const StudySettings *setti
     if (status == STATUS_OK && scene.is_failed)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
     const StudyDocument document = {answer, result, scene.at};
+    // First, so that they are there where the reader of the standard output ends early.
+    for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
+        status =
+            study_write(study_format(kind, outputs->at[i]), outputs->at[i], &document, problem);
     // The document's own study prints nothing where it is written to files.
     if (status == STATUS_OK && (settings->json || (command->view == NULL && outputs->count == 0)))
         status = study_write(&format_json, NULL, &document, problem);
     else if (status == STATUS_OK && command->view != NULL)
         status = study_print(command, answer, problem);
-    for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
-        status =
-            study_write(study_format(kind, outputs->at[i]), outputs->at[i], &document, problem);
     bytes_clear(&scene);
     variant_free(answer);
     return status;
@@ -439,6 +441,11 @@ static Status study_choose(StudyRequest *request, StudySettings *settings, Probl
                            studies[0]->kind.name);
     if (command->kind == NULL)
         return STATUS_OK;
+    const char *given = request->study != NULL ? request->study->kind->name : "";
+    if (command->choose == NULL && given[0] != '\0' && strcmp(given, command->kind->kind.name) != 0)
+        return problem_add(problem, STATUS_INVALID, "/study/kind",
+                           "is %s, not %s: `impactd study` makes it", given,
+                           command->kind->kind.name);
     if (request->study == NULL || request->study->kind != &command->kind->kind) {
         variant_free(request->study);
         request->study = variant_new(&command->kind->kind);
@@ -480,8 +487,16 @@ static int study_command_run(const Command *self, void *of, const Options *optio
     return input_command(self, "scene", options, of, study_scene, problem);
 }
 
+// The members of a command that all of these have alike.
+#define STUDY_COMMAND(name_text, kind, choose, add)                                                \
+    .name = name_text, .operands = "SCENE.json", .size = sizeof(StudySettings),                    \
+    .run = study_command_run, .study = &(const StudyCommand) {                                     \
+        kind, choose, add                                                                          \
+    }
+
+// Of the studies whose request is all in the scene.
 static const Field study_fields[] = {
-    OUTPUT_ROW(".json the whole or .csv the table or .svg the chart, where the study has them"),
+    OUTPUT_ROW(".json the whole, .csv or .npz the table or .svg the chart"),
     JSON_ROW,
     RECORD_ROWS(StudySettings),
     CPU_ROW(StudySettings),
@@ -489,8 +504,7 @@ static const Field study_fields[] = {
 };
 
 const Command command_study = {
-    .name = "study",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("study", NULL, NULL, NULL),
     .summary = "make the study that a scene asks for: compare, sensitivity and the others",
     .help =
         "  impactd study scene.json                       the answer as JSON\n"
@@ -501,9 +515,6 @@ const Command command_study = {
         "contact models side by side. Ctrl-C stops at once. Exit code 3 if the scene has\n"
         "faults or no study, 1 if its run failed.\n",
     .options = study_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){NULL, NULL, NULL},
 };
 
 // Ranges and defaults are the study's own.
@@ -552,8 +563,7 @@ static void tradeoff_choose(void *asked, StudySettings *settings) {
 }
 
 const Command command_tradeoff = {
-    .name = "tradeoff",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("tradeoff", &study_tradeoff, tradeoff_choose, NULL),
     .summary = "try solvers and steps on a scene: error against CPU time",
     .help =
         "  impactd tradeoff scene.json                          the table, and what to take\n"
@@ -569,15 +579,12 @@ const Command command_tradeoff = {
         "little. Ctrl-C stops at once. Exit code 3 if the scene has faults, 1 if its\n"
         "exact run failed.\n",
     .options = tradeoff_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){&study_tradeoff, tradeoff_choose, NULL},
     .view = &tradeoff_view,
 };
 
 // Ranges and defaults are the study's own.
 static const Field ensemble_fields[] = {
-    OUTPUT_ROW(".json the whole, .csv the runs or .svg the chart"),
+    OUTPUT_ROW(".json the whole, .csv or .npz the runs or .svg the chart"),
     JSON_ROW,
     FIELD_COUNT(StudySettings, runs, NULL, AT_MIN(0), OPTIONAL,
                 "runs, under a target at most so many (64)"),
@@ -638,8 +645,7 @@ static void ensemble_add(const Variant *answer, Bytes *json) {
 }
 
 const Command command_ensemble = {
-    .name = "ensemble",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("ensemble", &study_ensemble, ensemble_choose, ensemble_add),
     .summary = "many seeds or uncertain inputs: means with their confidence, and spread",
     .help =
         "  impactd ensemble scene.json                          64 seeds: statistics and spectra\n"
@@ -656,9 +662,6 @@ const Command command_ensemble = {
         "out. The same study gives the same bytes. Ctrl-C stops at once. Exit code 3 if\n"
         "the scene has faults.\n",
     .options = ensemble_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){&study_ensemble, ensemble_choose, ensemble_add},
     .view = &ensemble_view,
 };
 
@@ -701,8 +704,7 @@ static void sweep_add(const Variant *answer, Bytes *json) {
 }
 
 const Command command_sweep = {
-    .name = "sweep",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("sweep", &study_sweep, NULL, sweep_add),
     .summary = "the scene at many points: a grid or a list of values of its members",
     .help = "  impactd sweep scene.json                             smallest and largest of each "
             "metric\n"
@@ -720,52 +722,90 @@ const Command command_sweep = {
             "bytes, here and by a server, which uses all its workers. Exit code 3 if the\n"
             "scene has faults.\n",
     .options = sweep_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){&study_sweep, NULL, sweep_add},
     .view = &sweep_view,
 };
 
-// Of the studies whose request is all in the scene.
-static const Field design_fields[] = {
-    OUTPUT_ROW(".json the whole, .csv or .npz the table or .svg the chart"),
-    JSON_ROW,
-    RECORD_ROWS(StudySettings),
-    CPU_ROW(StudySettings),
-    FIELD_END,
-};
+// Of the studies that design: what is printed, and the study in the scene.
+#define DESIGN_HELP(name, operands, prints, study)                                                 \
+    "  impactd " name " scene.json" operands "\n"                                                  \
+    "        " prints "\n"                                                                         \
+    "  impactd " name " scene.json" operands " -o out.svg -o out.csv\n"                            \
+    "        the chart, and the table as a file; --json prints the whole answer\n"                 \
+    "\n"                                                                                           \
+    "The scene says what is asked for, as in\n"                                                    \
+    "\n"                                                                                           \
+    "  \"study\": {\"kind\": \"" name "\", " study "}\n"                                           \
+    "\n"                                                                                           \
+    "Exit code 3 if the scene has faults.\n"
 
 static const PrintTableView optimize_view = {
-    .skipped = (const char *const[]){"kind", "history", NULL},
+    .skipped = (const char *const[]){"kind", "history", "metrics", "given", "undamped", "front",
+                                     "rivals", NULL},
     .lists = (const PrintTableColumns[]){{"values", {"pointer", "value"}},
-                                         {"objectives", {"metric", "value", "interval_95"}},
-                                         {"rivals", {"difference", "interval_95", "values"}},
+                                         {"objectives", {"metric", "goal", "value", "interval_95"}},
+                                         {"gain", {"metric", "best", "given", "undamped", "unit"}},
                                          {NULL, {NULL}}},
 };
 
+static void optimize_put_metrics(const Optimum *optimum, Bytes *json) {
+    const bool has_best = optimum->best.values.count > 0;
+    const char *between = "";
+    for (int m = 0; m < STUDY_METRIC_COUNT; m++)
+        if (!isnan(optimum->given.metrics.of[m])) {
+            bytes_json(json,
+                       "%p{\"metric\": %s, \"best\": %g, \"given\": %g, \"undamped\": %g, "
+                       "\"unit\": %s}",
+                       between, study_metric_names[m],
+                       has_best ? optimum->best.metrics.of[m] : (double)NAN,
+                       optimum->given.metrics.of[m], optimum->undamped.metrics.of[m],
+                       study_metric_unit(m));
+            between = ", ";
+        }
+}
+
+static void optimize_put_values(const OptimumValues *values, Bytes *json) {
+    for (size_t i = 0; i < values->count; i++)
+        bytes_json(json, "%s: %p, ", values->at[i].pointer, values->at[i].value);
+}
+
+// The metrics side by side; the front and the rivals with a column for each variable.
+static void optimize_add(const Variant *answer, Bytes *json) {
+    const Optimum *optimum = (const Optimum *)(const void *)answer;
+    bytes_text(json, ", \"gain\": [");
+    optimize_put_metrics(optimum, json);
+    bytes_text(json, "], \"best of both\": [");
+    for (size_t i = 0; i < optimum->front.count; i++) {
+        const OptimumCandidate *candidate = &optimum->front.at[i];
+        bytes_text(json, i > 0 ? ", {" : "{");
+        optimize_put_values(&candidate->values, json);
+        for (size_t k = 0; k < 2; k++)
+            bytes_json(json, "%p%s: %g", k > 0 ? ", " : "",
+                       study_metric_names[optimum->objectives.at[k].metric],
+                       candidate->objectives.at[k]);
+        bytes_text(json, "}");
+    }
+    bytes_text(json, "], \"nearly as good\": [");
+    for (size_t i = 0; i < optimum->rivals.count; i++) {
+        const OptimumRival *rival = &optimum->rivals.at[i];
+        bytes_text(json, i > 0 ? ", {" : "{");
+        optimize_put_values(&rival->values, json);
+        bytes_json(json, "\"difference\": %g, \"interval_95\": [", rival->difference);
+        bytes_reals(json, rival->interval_95.at, rival->interval_95.count);
+        bytes_text(json, "]}");
+    }
+    bytes_text(json, "]");
+}
+
 const Command command_optimize = {
-    .name = "optimize",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("optimize", &study_optimize, NULL, optimize_add),
     .summary = "values of members of a scene that make a metric best, under constraints",
-    .help = "  impactd optimize scene.json                     the best values, and rivals\n"
-            "  impactd optimize scene.json -o out.svg          the chart of the search\n"
-            "  impactd optimize scene.json -o out.csv          every candidate\n"
-            "  impactd optimize scene.json --json              the whole answer\n"
-            "\n"
-            "The scene says what varies and what is best:\n"
-            "\n"
-            "  \"study\": {\"kind\": \"optimize\", \"objectives\": [{\"metric\": "
-            "\"rms_displacement\"}],\n"
-            "    \"variables\": [{\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, \"to\": "
-            "0.03}],\n"
-            "    \"over\": {\"runs\": 64}}\n"
-            "\n"
-            "Each candidate is run over the same seeds or records. Exit code 3 if the scene\n"
-            "has faults.\n",
-    .options = design_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){&study_optimize, NULL, NULL},
+    .help =
+        DESIGN_HELP("optimize", "", "the best values, their gain and their rivals",
+                    "\"objectives\": [{\"metric\": \"rms_displacement\"}],\n"
+                    "    \"variables\": [{\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, "
+                    "\"to\": 0.03}],\n"
+                    "    \"over\": {\"runs\": 64}"),
+    .options = study_fields,
     .view = &optimize_view,
 };
 
@@ -777,26 +817,15 @@ static const PrintTableView calibrate_view = {
         {NULL, {NULL}}}};
 
 const Command command_calibrate = {
-    .name = "calibrate",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("calibrate", &study_calibrate, NULL, NULL),
     .summary = "fit parameters of a scene to measured motions",
-    .help = "  impactd calibrate scene.json                    parameters with their intervals\n"
-            "  impactd calibrate scene.json -o out.svg         measured and fitted motions\n"
-            "  impactd calibrate scene.json --json             the whole answer\n"
-            "\n"
-            "The scene holds the measurement:\n"
-            "\n"
-            "  \"study\": {\"kind\": \"calibrate\",\n"
-            "    \"parameters\": [{\"pointer\": \"/dampers/0/buffer/restitution\", \"from\": 0.3, "
-            "\"to\": 0.9}],\n"
-            "    \"measured\": [{\"channel\": \"displacement\", \"interval\": 0.01, \"samples\": "
-            "[...]}]}\n"
-            "\n"
-            "Exit code 3 if the scene has faults.\n",
-    .options = design_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){&study_calibrate, NULL, NULL},
+    .help = DESIGN_HELP("calibrate", "", "the parameters with their intervals, and the verdict",
+                        "\"parameters\":\n"
+                        "      [{\"pointer\": \"/dampers/0/buffer/restitution\", \"from\": 0.3, "
+                        "\"to\": 0.9}],\n"
+                        "    \"measured\": [{\"channel\": \"displacement\", \"interval\": 0.01, "
+                        "\"samples\": [...]}]"),
+    .options = study_fields,
     .view = &calibrate_view,
 };
 
@@ -809,23 +838,13 @@ static const PrintTableView response_view = {
         {NULL, {NULL}}}};
 
 const Command command_response = {
-    .name = "response",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("response", &study_response, NULL, NULL),
     .summary = "steady motion under a sine while a number varies: periodic orbits, stability",
-    .help = "  impactd response scene.json                     the curve as a table\n"
-            "  impactd response scene.json -o out.svg          the chart\n"
-            "  impactd response scene.json -o out.csv          the table as a file\n"
-            "\n"
-            "The scene has a sine, and says what varies:\n"
-            "\n"
-            "  \"study\": {\"kind\": \"response\", \"direction\": \"both\", \"axis\":\n"
-            "    {\"pointer\": \"/excitation/frequency\", \"from\": 3, \"to\": 5, \"count\": 81}}\n"
-            "\n"
-            "Exit code 3 if the scene has faults.\n",
-    .options = design_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){&study_response, NULL, NULL},
+    .help = DESIGN_HELP("response", "", "the curve as a table; the scene's excitation is a sine",
+                        "\"direction\": \"both\", \"axis\":\n"
+                        "    {\"pointer\": \"/excitation/frequency\", \"from\": 3, \"to\": 5, "
+                        "\"count\": 81}"),
+    .options = study_fields,
     .view = &response_view,
 };
 
@@ -838,24 +857,14 @@ static const PrintTableView fragility_view = {
                                     {NULL, {NULL}}}};
 
 const Command command_fragility = {
-    .name = "fragility",
-    .operands = "SCENE.json",
+    STUDY_COMMAND("fragility", &study_fragility, NULL, NULL),
     .summary = "probability of exceeding limits under ground motions of rising intensity",
-    .help = "  impactd fragility scene.json --record a.AT2 --record b.AT2\n"
-            "  impactd fragility scene.json --record a.AT2 --record b.AT2 -o out.svg\n"
-            "\n"
-            "The scene names the ground motions by the names of the files:\n"
-            "\n"
-            "  \"study\": {\"kind\": \"fragility\", \"records\": [\"a\", \"b\"], \"intensity\": "
-            "\"pga\",\n"
-            "    \"levels\": {\"from\": 0.5, \"to\": 10, \"count\": 20},\n"
-            "    \"limits\": [{\"metric\": \"peak_displacement\", \"value\": 0.02}]}\n"
-            "\n"
-            "A server has them by name (impactd records add, impactd submit). Exit code 3 if\n"
-            "the scene has faults.\n",
-    .options = design_fields,
-    .size = sizeof(StudySettings),
-    .run = study_command_run,
-    .study = &(const StudyCommand){&study_fragility, NULL, NULL},
+    .help = DESIGN_HELP("fragility", " --record a.AT2 --record b.AT2",
+                        "the limits' medians and dispersions; the scene names the files without "
+                        ".AT2",
+                        "\"records\": [\"a\", \"b\"], \"intensity\": \"pga\",\n"
+                        "    \"levels\": {\"from\": 0.5, \"to\": 10, \"count\": 20},\n"
+                        "    \"limits\": [{\"metric\": \"peak_displacement\", \"value\": 0.02}]"),
+    .options = study_fields,
     .view = &fragility_view,
 };

@@ -1,13 +1,19 @@
 #!/usr/bin/env python3
 """What all studies owe alike: exit codes of their commands, an end at once, progress, faults at their places."""
 
+import csv
+import io
 import json
+import math
 import os
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+
+import numpy
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
@@ -39,8 +45,8 @@ def test_faults_have_their_exit_codes():
     """2 for wrong words, 3 for a scene or study with faults, 4 for a missing file, 1 for what cannot be written."""
     for arguments, code, expected in [
             (("ensemble",), 2, "takes one scene"),
-            (("ensemble", RANDOM, "-o", "out.npy"), 2, "one of .json, .csv, .svg"),
-            (("ensemble", RANDOM, "-o", ".svg"), 2, "one of .json, .csv, .svg"),
+            (("ensemble", RANDOM, "-o", "out.npy"), 2, "one of .json, .csv, .npz, .svg"),
+            (("ensemble", RANDOM, "-o", ".svg"), 2, "one of .json, .csv, .npz, .svg"),
             (("ensemble", RANDOM, "--metric", "impact"), 2, "did you mean impacts?"),
             (("ensemble", RANDOM, "--run", "1"), 2, "did you mean --runs?"),
             (("ensemble", RANDOM, "--runs", "1"), 3, "/study/runs: must be within [2, 10000]"),
@@ -49,6 +55,8 @@ def test_faults_have_their_exit_codes():
             (("ensemble", FREE), 3, "/excitation/kind must be random, is free"),
             (("ensemble", RANDOM, "-o", "/nonexistent/out.svg"), 1, "cannot be written"),
             (("ensemble", "/nonexistent.json"), 4, "cannot be read"),
+            (("optimize", FREE), 3, "/study/variables: is required"),
+            (("response", os.path.join(program.EXAMPLES, "optimize_clearance.json")), 3, "is optimize, not response: `impactd study` makes it"),
             (("tradeoff",), 2, "takes one scene"),
             (("tradeoff", FREE, "-o", "out.csv"), 2, ".svg"),
             (("tradeoff", FREE, "--metric", "pds"), 2, "did you mean psd?"),
@@ -67,6 +75,42 @@ def test_faults_have_their_exit_codes():
         assert code == 0 and f"Study: {kind}" in out
     code, out, _ = program.run("tradeoff", "--help")
     assert code == 0 and out.splitlines()[2].strip().startswith("impactd tradeoff scene.json"), out
+
+
+def test_every_format_that_a_help_names_is_written():
+    """Each extension of -o in the help of a study's command makes a file of that format, in one call with the table for people."""
+    examples = {"optimize": "optimize_clearance", "calibrate": "calibrate_free_sponge", "response": "response_sponge",
+                "fragility": "with_records/fragility", "ensemble": "ensemble_inputs", "sweep": "sweep_clearance_buffer",
+                "study": "sensitivity_sponge"}
+    starts = {"json": b"{", "csv": b"", "npz": b"PK", "npy": b"\x93NUMPY", "mat": b"MATLAB", "svg": b"<svg"}
+    small = {"optimize": {"max_candidates": 10, "over": {"runs": 8}}, "ensemble": {"runs": 8}, "calibrate": {"starts": 1},
+             "response": {"axis": {"pointer": "/excitation/frequency", "from": 3, "to": 3.5, "count": 5}}}
+    for kind, name in examples.items():
+        scene = program.scene(name)
+        scene["study"].update(small.get(kind, {}))
+        _, out, _ = program.run("help", kind)
+        extensions = sorted(set(re.findall(r"[.](json|csv|npy|npz|mat|svg)\b", out.replace("scene.json", ""))))
+        assert {"json", "csv", "svg"} <= set(extensions), (kind, out)
+        with tempfile.TemporaryDirectory() as folder:
+            arguments = [kind, "-"]
+            for record in scene["study"].get("records", []):
+                path = os.path.join(folder, record + ".txt")
+                with open(path, "w", encoding="utf-8") as file:
+                    file.writelines(f"{i / 50} {math.sin(i)}\n" for i in range(100))
+                arguments += ["--unit", "g", "--record", path]
+            paths = {extension: os.path.join(folder, "out." + extension) for extension in extensions}
+            for path in paths.values():
+                arguments += ["-o", path]
+            code, _, errors = program.run(*arguments, text=json.dumps(scene))
+            assert code == 0, (kind, errors)
+            contents = {extension: open(path, "rb").read() for extension, path in paths.items()}
+        for extension, content in contents.items():
+            assert content.startswith(starts[extension]) and len(content) > 40, (kind, extension, content[:40])
+        rows = list(csv.reader(io.StringIO(contents["csv"].decode())))
+        assert {len(row) for row in rows} == {len(rows[0])} and not re.search(r'"""|null|None', contents["csv"].decode()), (kind, rows)
+        with numpy.load(io.BytesIO(contents["npz"])) as arrays:
+            assert {len(arrays[column]) for column in arrays.files} == {len(rows) - 1}, kind
+            assert len(arrays.files) == len(rows[0]), (kind, arrays.files)
 
 
 def test_an_interrupt_stops_at_once():
