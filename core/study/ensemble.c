@@ -64,15 +64,10 @@ static const Field ensemble_statistic_fields[] = {
     FIELD_END
 };
 
+#define ENSEMBLE_STATISTIC_ROW(constant, name, unit)                                              \
+    FIELD_ITEM(EnsembleStatistics, name, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "statistics of this metric of the summary; unknown where the scene has none"),
 static const Field ensemble_statistics_fields[] = {
-    FIELD_ITEM(EnsembleStatistics, peak_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "statistics of this metric of the summary"),
-    FIELD_ITEM(EnsembleStatistics, rms_displacement, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
-    FIELD_ITEM(EnsembleStatistics, peak_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
-    FIELD_ITEM(EnsembleStatistics, rms_acceleration, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
-    FIELD_ITEM(EnsembleStatistics, impacts, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
-    FIELD_ITEM(EnsembleStatistics, peak_contact_force, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise; unknown if contacts have no force"),
-    FIELD_ITEM(EnsembleStatistics, peak_storey_drift, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise; unknown if the structure is no frame"),
-    FIELD_ITEM(EnsembleStatistics, peak_base_shear, ensemble_statistic_fields, NULL, PRESENCE_DEFAULT, "likewise"),
+    STUDY_METRICS_SUMMARY(ENSEMBLE_STATISTIC_ROW)
     FIELD_END
 };
 

@@ -18,10 +18,10 @@ typedef struct EnsembleStudy {
     bool sobol_indices;
 } EnsembleStudy;
 
+#define ENSEMBLE_STATISTIC(constant, name, unit) RunStatistic name;
 typedef union EnsembleStatistics {
     struct {
-        RunStatistic peak_displacement, rms_displacement, peak_acceleration, rms_acceleration,
-            impacts, peak_contact_force, peak_storey_drift, peak_base_shear;
+        STUDY_METRICS_SUMMARY(ENSEMBLE_STATISTIC)
     };
     RunStatistic of[STATISTICS_METRICS];
 } EnsembleStatistics;

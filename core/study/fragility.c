@@ -11,7 +11,6 @@
 #include "core/base/json_pointer.h"
 #include "core/excitation/response_spectrum.h"
 #include "core/math/lognormal_fit.h"
-#include "core/study/statistics.h"
 
 enum { COST_RECORDS = 16, NAMES_SHOWN = 3 };
 

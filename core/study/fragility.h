@@ -5,7 +5,7 @@
 
 #include "core/base/report.h"
 #include "core/study/axis.h"
-#include "core/study/metrics.h"
+#include "core/study/statistics.h"
 
 enum {
     FRAGILITY_RECORDS = 1000,

@@ -5,7 +5,6 @@
 
 #include "core/base/report.h"
 #include "core/study/axis.h"
-#include "core/study/metrics.h"
 #include "core/study/statistics.h"
 
 typedef enum OptimizeGoal { OPTIMIZE_MINIMIZE, OPTIMIZE_MAXIMIZE } OptimizeGoal;

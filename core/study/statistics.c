@@ -31,7 +31,6 @@
 #include <string.h>
 
 #include "core/math/student_t.h"
-#include "core/study/metrics.h"
 
 // sqrt(quantile / d) of a chi-square, relative to d = 1.
 static double stopping_rule_narrowing(double d) {
@@ -69,10 +68,60 @@ size_t stopping_rule_next_check(size_t count) {
     return count < STOPPING_RULE_PILOT ? STOPPING_RULE_PILOT : count + (count + 3) / 4;
 }
 
-const char *const statistics_metric_names[] = {STUDY_METRICS, "psd", NULL};
+const char *const study_metric_names[] = {STUDY_METRICS(STUDY_METRIC_NAME) NULL};
+const char *const statistics_metric_names[] = {STUDY_METRICS_SUMMARY(STUDY_METRIC_NAME) "psd",
+                                               NULL};
+
+#define STUDY_METRIC_ROW(constant, name, unit)                                                     \
+    FIELD_REAL(StudyMetrics, name, unit, ANY, OPTIONAL, #name),
+const Field study_metrics_fields[] = {STUDY_METRICS(STUDY_METRIC_ROW) FIELD_END};
+
+const char *study_metric_unit(int metric) {
+    return study_metrics_fields[metric].unit;
+}
+
+bool study_metric_is_reduction(int metric) {
+    return metric >= STATISTICS_METRICS;
+}
+
+Status study_metric_check(const Simulation *simulation, int metric, const char *place,
+                          Problem *problem) {
+    char name[64];
+    text_fit(name, sizeof name, study_metric_names[metric]);
+    if (study_metric_is_reduction(metric)) {
+        if (simulation->scene.dampers.count == 0)
+            return problem_add(problem, STATUS_INVALID, place,
+                               "needs a damper: a reduction compares the scene with and without");
+        name[strlen(name) - strlen("_reduction")] = '\0';
+    }
+    return simulation_check_metric(simulation, name, place, problem);
+}
+
+static double metric_read(const Field *fields, const void *item, const char *name) {
+    size_t offset = 0;
+    const Field *row = fields_find(fields, name, &offset);
+    const void *member = (const char *)item + offset + row->offset;
+    if (row->kind == FIELD_KIND_REAL)
+        return *(const double *)member;
+    const uint64_t count = *(const uint64_t *)member;
+    return count != COUNT_ABSENT ? (double)count : (double)NAN;
+}
+
+double study_summary_value(const Summary *summary, const char *name) {
+    return metric_read(summary_fields, summary, name);
+}
+
+StudyMetrics study_metrics_of(const RunRecord *run) {
+    StudyMetrics metrics;
+    for (int i = 0; i < STUDY_METRIC_COUNT; i++)
+        metrics.of[i] = study_metric_is_reduction(i)
+                            ? metric_read(reduction_fields, &run->reduction, study_metric_names[i])
+                            : study_summary_value(&run->summary, study_metric_names[i]);
+    return metrics;
+}
 
 double statistics_value(const Summary *summary, int metric) {
-    return study_summary_value(summary, statistics_metric_names[metric]);
+    return study_summary_value(summary, study_metric_names[metric]);
 }
 
 // Known values of a metric, in the order of the table.

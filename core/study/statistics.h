@@ -27,21 +27,60 @@ size_t stopping_rule_predict(const RunSpread *spread, size_t all, double target)
 // Number of runs at the check that follows the one at `count`.
 size_t stopping_rule_next_check(size_t count);
 
-// The numbers of a summary that have statistics; the spectra have none here.
+// The metrics by which studies compare runs, in one enumeration: numbers of the summary, of which
+// the usual ones come first, and their reductions by the dampers. Constant, name there, unit.
+#define STUDY_METRICS_USUAL(X)                                                                     \
+    X(PEAK_DISPLACEMENT, peak_displacement, "m")                                                   \
+    X(RMS_DISPLACEMENT, rms_displacement, "m")                                                     \
+    X(PEAK_ACCELERATION, peak_acceleration, "m/s^2")                                               \
+    X(RMS_ACCELERATION, rms_acceleration, "m/s^2")                                                 \
+    X(IMPACTS, impacts, NULL)                                                                      \
+    X(PEAK_CONTACT_FORCE, peak_contact_force, "N")
+#define STUDY_METRICS_SUMMARY(X)                                                                   \
+    STUDY_METRICS_USUAL(X)                                                                         \
+    X(PEAK_STOREY_DRIFT, peak_storey_drift, "m")                                                   \
+    X(PEAK_BASE_SHEAR, peak_base_shear, "N")
+#define STUDY_METRICS(X)                                                                           \
+    STUDY_METRICS_SUMMARY(X)                                                                       \
+    X(PEAK_DISPLACEMENT_REDUCTION, peak_displacement_reduction, NULL)                              \
+    X(RMS_DISPLACEMENT_REDUCTION, rms_displacement_reduction, NULL)                                \
+    X(PEAK_ACCELERATION_REDUCTION, peak_acceleration_reduction, NULL)                              \
+    X(RMS_ACCELERATION_REDUCTION, rms_acceleration_reduction, NULL)                                \
+    X(PEAK_STOREY_DRIFT_REDUCTION, peak_storey_drift_reduction, NULL)                              \
+    X(PEAK_BASE_SHEAR_REDUCTION, peak_base_shear_reduction, NULL)
+
+#define STUDY_METRIC_CONSTANT(constant, name, unit) STATISTICS_##constant,
 typedef enum StatisticsMetric {
-    STATISTICS_PEAK_DISPLACEMENT,
-    STATISTICS_RMS_DISPLACEMENT,
-    STATISTICS_PEAK_ACCELERATION,
-    STATISTICS_RMS_ACCELERATION,
-    STATISTICS_IMPACTS,
-    STATISTICS_PEAK_CONTACT_FORCE,
-    STATISTICS_USUAL, // their number
-    STATISTICS_PEAK_STOREY_DRIFT = STATISTICS_USUAL,
-    STATISTICS_PEAK_BASE_SHEAR,
-    STATISTICS_METRICS,
-    STATISTICS_PSD = STATISTICS_METRICS,
+    STUDY_METRICS(STUDY_METRIC_CONSTANT) STUDY_METRIC_COUNT,
+    STATISTICS_USUAL = STATISTICS_PEAK_STOREY_DRIFT, // their number, as the next
+    STATISTICS_METRICS = STATISTICS_PEAK_DISPLACEMENT_REDUCTION,
+    STATISTICS_PSD = STATISTICS_METRICS, // of a target; spectra have no statistics here
 } StatisticsMetric;
-extern const char *const statistics_metric_names[]; // NULL-terminated, psd the last
+extern const char *const study_metric_names[];      // NULL-terminated
+extern const char *const statistics_metric_names[]; // those of the summary, then psd; likewise
+
+#define STUDY_METRIC_NAME(constant, name, unit) #name, // for lists of names
+
+// All metrics of a run, or statistics of them over runs. NAN: unknown.
+#define STUDY_METRIC_MEMBER(constant, name, unit) double name;
+typedef union StudyMetrics {
+    struct {
+        STUDY_METRICS(STUDY_METRIC_MEMBER)
+    };
+    double of[STUDY_METRIC_COUNT];
+} StudyMetrics;
+extern const Field study_metrics_fields[];
+
+const char *study_metric_unit(int metric); // NULL: none
+// Whether a run needs output.reduction for it.
+bool study_metric_is_reduction(int metric);
+// Validates that the scene can have a metric, which is the value at `place`.
+Status study_metric_check(const Simulation *simulation, int metric, const char *place,
+                          Problem *problem);
+// A number of a summary by its name; NAN: unknown.
+double study_summary_value(const Summary *summary, const char *name);
+// Of a run that ended; without its reductions where output.reduction was not requested.
+StudyMetrics study_metrics_of(const RunRecord *run);
 
 #define STATISTICS_CONFIDENCE 0.95 // of the intervals of means
 

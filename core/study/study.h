@@ -50,13 +50,6 @@ typedef struct StudyFailures {
 Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
                           const char *why);
 
-// The metrics of a summary that studies compare, by their names there; the usual ones
-// are the default.
-#define STUDY_METRICS_USUAL                                                                        \
-    "peak_displacement", "rms_displacement", "peak_acceleration", "rms_acceleration", "impacts",   \
-        "peak_contact_force"
-#define STUDY_METRICS STUDY_METRICS_USUAL, "peak_storey_drift", "peak_base_shear"
-
 // Densities that a run's spectra hold; 0 without spectra.
 double study_run_densities(const Simulation *simulation);
 

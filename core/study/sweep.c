@@ -17,7 +17,7 @@
 
 #include "core/base/json_pointer.h"
 #include "core/excitation/recorded_motion.h"
-#include "core/study/metrics.h"
+#include "core/study/statistics.h"
 
 enum {
     PLACE = sizeof((Fault){0}.pointer),
@@ -34,8 +34,9 @@ const char *const sweep_status_names[] = {"made",   "invalid", "unstable", "limi
                                           "failed", "pending", NULL};
 // The metrics of a point: the summary's numbers in their order, then the solver's steps.
 static const char *const sweep_metric_names[] = {
-    STUDY_METRICS, "energy_residual", "error_estimate", "trust_horizon", "steps", NULL};
-static const char *const sweep_default_metrics[] = {STUDY_METRICS_USUAL, NULL};
+    STUDY_METRICS_SUMMARY(STUDY_METRIC_NAME) "energy_residual", "error_estimate", "trust_horizon",
+    "steps", NULL};
+static const char *const sweep_default_metrics[] = {STUDY_METRICS_USUAL(STUDY_METRIC_NAME) NULL};
 
 const char *sweep_metric_unit(const char *name) {
     const Field *row = fields_find(summary_fields, name, NULL);
