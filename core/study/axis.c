@@ -7,29 +7,36 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/base/json_pointer.h"
-
 static const char *const study_spacing_names[] = {"linear", "logarithmic", NULL};
 
 // clang-format off
-#define AXIS_MEMBERS                                                                               \
+#define AXIS_POINTERS                                                                              \
     FIELD_TEXT(StudyAxis, pointer, 200, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member that varies, such as /dampers/0/clearance; values of a buffer are names of materials, of /excitation/name names of records, of a kind's name (/contact/model) kinds"), \
-    FIELD_TEXTS(StudyAxis, pointers, NULL, NULL, STUDY_AXIS_POINTERS, PRESENCE_OPTIONAL, 0, "in place of pointer: several members that all get the same value"), \
-    FIELD_TEXTS(StudyAxis, values, NULL, NULL, STUDY_AXIS_VALUES, PRESENCE_OPTIONAL, FIELD_SCALARS, "its values in this order; or give a range"), \
-    FIELD_REAL(StudyAxis, from, NULL, ANY, OPTIONAL, "first value of a range"),               \
+    FIELD_TEXTS(StudyAxis, pointers, NULL, NULL, STUDY_AXIS_POINTERS, PRESENCE_OPTIONAL, 0, "in place of pointer: several members that all get the same value")
+#define AXIS_VALUES FIELD_TEXTS(StudyAxis, values, NULL, NULL, STUDY_AXIS_VALUES, PRESENCE_OPTIONAL, FIELD_SCALARS, "its values in this order; or give a range")
+#define AXIS_RANGE                                                                                 \
+    FIELD_REAL(StudyAxis, from, NULL, ANY, OPTIONAL, "first value of a range"),                    \
     FIELD_REAL(StudyAxis, to, NULL, ANY, OPTIONAL, "last number of a range")
+#define AXIS_NO_GRID                                                                               \
+    {.name = "count", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyAxis, count, uint64_t), .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN}, \
+    {.name = "spacing", .kind = FIELD_KIND_CHOICE, .offset = FIELD_AT(StudyAxis, spacing, int), .choices = study_spacing_names, .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN}
 
 const Field study_axis_fields[] = {
-    AXIS_MEMBERS,
+    AXIS_POINTERS,
+    AXIS_VALUES,
+    AXIS_RANGE,
     FIELD_COUNT(StudyAxis, count, NULL, WITHIN(2, STUDY_AXIS_VALUES), OPTIONAL, "number of values, both ends included"),
     FIELD_CHOICE(StudyAxis, spacing, study_spacing_names, OPTIONAL, "spacing of a range: equal differences or equal ratios; linear if absent"),
     FIELD_END
 };
 
-const Field study_variable_fields[] = {
-    AXIS_MEMBERS,
-    {.name = "count", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyAxis, count, uint64_t), .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN},
-    {.name = "spacing", .kind = FIELD_KIND_CHOICE, .offset = FIELD_AT(StudyAxis, spacing, int), .choices = study_spacing_names, .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN},
+const Field study_variable_fields[] = {AXIS_POINTERS, AXIS_VALUES, AXIS_RANGE, AXIS_NO_GRID, FIELD_END};
+
+const Field study_range_fields[] = {
+    AXIS_POINTERS,
+    AXIS_RANGE,
+    AXIS_NO_GRID,
+    {.name = "values", .kind = FIELD_KIND_TEXTS, .offset = FIELD_AT(StudyAxis, values, Texts), .size = sizeof(char *), .presence = PRESENCE_OPTIONAL, .flags = FIELD_HIDDEN},
     FIELD_END
 };
 
@@ -111,8 +118,7 @@ Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, 
     return STATUS_OK;
 }
 
-// The place of one of the pointers of an axis.
-static JsonPointer study_axis_place(const StudyAxis *axis, const char *place, size_t index) {
+JsonPointer study_axis_place(const StudyAxis *axis, const char *place, size_t index) {
     return axis->pointer != NULL ? json_pointer_of(place, "pointer")
                                  : json_pointer_at(json_pointer_of(place, "pointers").at, index);
 }
@@ -130,7 +136,7 @@ static Status study_axes_check_pointer(const StudyAxes *axes, bool is_grid, size
                 return problem_add(problem, STATUS_INVALID,
                                    study_axis_place(&axes->at[number], place, index).at,
                                    is_grid ? "is also the pointer of axis %zu: give one axis each"
-                                           : "is also set by variable %zu: give one variable each",
+                                           : "is also set by entry %zu: give one entry each",
                                    i);
     }
     return STATUS_OK;
@@ -286,6 +292,11 @@ const Field *study_axis_find(const StudyAxis *axis, Simulation *scene, bool *is_
         }
     }
     return is_sound ? found : NULL;
+}
+
+bool study_field_is_real(const Field *field, bool is_tag) {
+    return !is_tag && (field->kind == FIELD_KIND_REAL || field->kind == FIELD_KIND_REALS ||
+                       field->kind == FIELD_KIND_ROWS);
 }
 
 Status study_axes_find(const StudyAxes *axes, const Simulation *simulation, const char *place,

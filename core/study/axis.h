@@ -4,6 +4,7 @@
 #ifndef CORE_STUDY_AXIS_H
 #define CORE_STUDY_AXIS_H
 
+#include "core/base/json_pointer.h"
 #include "core/excitation/recorded_motion.h"
 #include "core/study/study.h"
 
@@ -31,8 +32,8 @@ typedef struct StudyAxes {
     size_t count;
 } StudyAxes;
 
-// All members; and without count and spacing, of a continuous range or values.
-extern const Field study_axis_fields[], study_variable_fields[];
+// All members; without count and spacing, of a continuous range or values; and of a range alone.
+extern const Field study_axis_fields[], study_variable_fields[], study_range_fields[];
 
 typedef struct Buffers {
     Buffer *at;
@@ -66,6 +67,8 @@ typedef struct StudyValue {
 
 size_t study_axis_pointer_count(const StudyAxis *axis);
 const char *study_axis_pointer(const StudyAxis *axis, size_t index); // from 0
+// The place of one of the pointers of the axis at `place`.
+JsonPointer study_axis_place(const StudyAxis *axis, const char *place, size_t index);
 bool study_axis_is_range(const StudyAxis *axis);
 // Number of values; COUNT_ABSENT of a continuous range.
 size_t study_axis_length(const StudyAxis *axis);
@@ -85,6 +88,8 @@ Status study_axes_check(const StudyAxes *axes, bool is_grid, const char *place, 
 // a later axis finds members that this one makes.
 const Field *study_axis_find(const StudyAxis *axis, Simulation *scene, bool *is_tag,
                              const char *place, Problem *problem);
+// Whether a member, of this row, takes every number of its range.
+bool study_field_is_real(const Field *field, bool is_tag);
 // Validates that the pointers of all axes are in the completed simulation.
 Status study_axes_find(const StudyAxes *axes, const Simulation *simulation, const char *place,
                        Problem *problem);

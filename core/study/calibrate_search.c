@@ -18,7 +18,7 @@
 
 #include "core/base/philox.h"
 #include "core/math/student_t.h"
-#include "core/study/sampling.h"
+#include "core/study/inputs.h"
 
 enum {
     VARIABLES = CALIBRATE_VARIABLES,

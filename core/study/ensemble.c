@@ -200,21 +200,11 @@ static Status ensemble_check_seeds(const EnsembleStudy *study, Problem *problem)
                             text_real(max, 0x1p53 - (double)seeds), seeds);
 }
 
-// Numbers that are drawn for one run.
-static size_t ensemble_numbers(const UncertainInputs *inputs) {
-    size_t count = 0;
-    for (size_t i = 0; i < inputs->count; i++) // a comparison with NAN is false
-        count += inputs->at[i].restitution_deviation > 0 && inputs->at[i].contact_time_deviation > 0
-                     ? 2
-                     : 1;
-    return count;
-}
-
 // What the options of inputs need of each other.
 static Status ensemble_check_inputs(const EnsembleStudy *study, const Simulation *simulation,
-                                    Problem *problem) {
+                                    size_t numbers, Problem *problem) {
     const size_t each = ensemble_sample_runs(study, simulation),
-                 dimensions = ensemble_numbers(&study->inputs) * (study->sobol_indices ? 2 : 1);
+                 dimensions = numbers * (study->sobol_indices ? 2 : 1);
     Status status = STATUS_OK;
     if (!isnan(study->target) && study->sobol_indices)
         status = problem_add(problem, STATUS_INVALID, "/study/target",
@@ -247,8 +237,9 @@ static Status ensemble_complete_inputs(EnsembleStudy *study, const Simulation *s
     }
     if (study->sampling == CHOICE_ABSENT)
         study->sampling = SAMPLING_RANDOM;
-    TRY(uncertain_inputs_complete(&study->inputs, simulation, limits, problem));
-    return ensemble_check_inputs(study, simulation, problem);
+    size_t numbers;
+    TRY(uncertain_inputs_complete(&study->inputs, simulation, limits, &numbers, problem));
+    return ensemble_check_inputs(study, simulation, numbers, problem);
 }
 
 static Status ensemble_complete(void *request, const Simulation *simulation,
@@ -602,7 +593,7 @@ static Status ensemble_add_index(const EnsembleWork *work, int metric, size_t in
                              .samples = estimate.count,
                              .first = estimate.first,
                              .total = estimate.total};
-    TRY(text_copy(input < inputs->count ? uncertain_input_pointer(&inputs->at[input], 0)
+    TRY(text_copy(input < inputs->count ? study_axis_pointer(&inputs->at[input].axis, 0)
                                         : "/excitation/seed",
                   &index->pointer));
     TRY(study_copy_reals(estimate.first_interval, 2, &index->first_interval_95));
@@ -660,7 +651,7 @@ static Status ensemble_begin_inputs(EnsembleWork *work) {
     TRY(ensemble_model(study, &work->base, &work->model));
     for (size_t i = 0; i < work->model.count; i++) {
         const InputNumber *number = &work->model.numbers[i];
-        const char *pointer = uncertain_input_pointer(number->input, 0),
+        const char *pointer = study_axis_pointer(&number->input->axis, 0),
                    *name =
                        sensitivity_parameter_names[number->parameter < 0 ? 0 : number->parameter];
         EnsembleInput *input = list_append(&answer->inputs, sizeof *input);

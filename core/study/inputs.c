@@ -1,5 +1,17 @@
-// A number is the quantile of its distribution at a coordinate of a point in the unit cube. One
-// that is out of its member's range is drawn again, from coordinates of its own.
+// Latin hypercube (McKay, Beckman and Conover, Technometrics 21, 239, 1979): in each dimension
+// every one of N equal strata has one of the N points, at a random place within.
+//
+// Sobol sequence: bit by bit in base 2, x_i = i_1 v_1 xor i_2 v_2 xor ..., with i_1 the lowest bit
+// of the row and the direction numbers v_j = m_j / 2^j of a primitive polynomial of degree s with
+// the inner coefficients a:
+//
+//   m_j = 2 a_1 m_(j-1) xor 2^2 a_2 m_(j-2) xor ... xor 2^s m_(j-s) xor m_(j-s).
+//
+// A digital shift, a random word for each dimension, makes means over the points unbiased and keeps
+// their uniformity.
+//
+// A number is the quantile of its distribution at a coordinate of a point. One that is out of its
+// member's range is drawn again, from coordinates of its own.
 #include "core/study/inputs.h"
 
 #include <math.h>
@@ -7,14 +19,129 @@
 #include <string.h>
 
 #include "core/base/json_pointer.h"
+#include "core/base/philox.h"
 #include "core/math/student_t.h"
 #include "core/study/sensitivity.h"
 
 enum {
-    POINTERS_MAX = 16, // of one input
-    DRAWS_MAX = 64,    // of one number
-    PARAMETERS = 9,    // of all distributions
+    WORD_BITS = 32,
+    STREAM_POINTS = 0x494e5000, // streams of random numbers, one for each dimension
+    STREAM_STRATA = 0x494e5100,
+    STREAM_AGAIN = 0x494e5200,
+    STREAM_SHIFT = 0x494e5300,
+    AGAIN_BITS = 20,
 };
+
+const char *const sampling_names[] = {"random", "latin_hypercube", "sobol", NULL};
+
+// Dimensions 2 to 32 of new-joe-kuo-6: S. Joe and F. Y. Kuo, "Constructing Sobol sequences with
+// better two-dimensional projections", SIAM J. Sci. Comput. 30, 2635 (2008). In the first one all m
+// are 1.
+// clang-format off
+static const struct {
+    uint8_t degree, coefficients;
+    uint8_t m[7];
+} sampling_directions[SAMPLING_SOBOL_DIMENSIONS - 1] = {
+    {1, 0, {1}}, {2, 1, {1, 3}}, {3, 1, {1, 3, 1}}, {3, 2, {1, 1, 1}}, {4, 1, {1, 1, 3, 3}},
+    {4, 4, {1, 3, 5, 13}}, {5, 2, {1, 1, 5, 5, 17}}, {5, 4, {1, 1, 5, 5, 5}},
+    {5, 7, {1, 1, 7, 11, 19}}, {5, 11, {1, 1, 5, 1, 1}}, {5, 13, {1, 1, 1, 3, 11}},
+    {5, 14, {1, 3, 5, 5, 31}}, {6, 1, {1, 3, 3, 9, 7, 49}}, {6, 13, {1, 1, 1, 15, 21, 21}},
+    {6, 16, {1, 3, 1, 13, 27, 49}}, {6, 19, {1, 1, 1, 15, 7, 5}}, {6, 22, {1, 3, 1, 15, 13, 25}},
+    {6, 25, {1, 1, 5, 5, 19, 61}}, {7, 1, {1, 3, 7, 11, 23, 15, 103}},
+    {7, 4, {1, 3, 7, 13, 13, 15, 69}}, {7, 7, {1, 1, 3, 13, 7, 35, 63}},
+    {7, 8, {1, 3, 5, 9, 1, 25, 53}}, {7, 14, {1, 3, 1, 13, 9, 35, 107}},
+    {7, 19, {1, 3, 1, 5, 27, 61, 31}}, {7, 21, {1, 1, 5, 11, 19, 41, 61}},
+    {7, 28, {1, 3, 5, 3, 3, 13, 69}}, {7, 31, {1, 1, 7, 13, 1, 19, 1}},
+    {7, 32, {1, 3, 7, 5, 13, 19, 59}}, {7, 37, {1, 1, 3, 9, 25, 29, 41}},
+    {7, 41, {1, 3, 5, 13, 23, 1, 55}}, {7, 42, {1, 3, 7, 3, 13, 59, 17}},
+};
+// clang-format on
+
+static void sampling_words(uint64_t seed, uint64_t stream, uint64_t index, uint32_t out[4]) {
+    const uint32_t counter[4] = {(uint32_t)index, (uint32_t)(index >> 32), (uint32_t)stream,
+                                 (uint32_t)(stream >> 32)};
+    const uint32_t key[2] = {(uint32_t)seed, (uint32_t)(seed >> 32)};
+    philox_words(counter, key, out);
+}
+
+// Midpoints of 2^52 equal parts, which a double holds exactly.
+static double sampling_uniform(uint64_t seed, uint64_t stream, uint64_t index) {
+    uint32_t words[4];
+    sampling_words(seed, stream, index, words);
+    return ((double)(((uint64_t)words[1] << 32 | words[0]) >> 12) + 0.5) * 0x1p-52;
+}
+
+// The word of a point, of which bit 31 is worth 1/2.
+static uint32_t sampling_sobol_word(uint64_t row, size_t dimension) {
+    uint32_t m[WORD_BITS], word = 0;
+    size_t degree = 0;
+    for (size_t j = 0; j < WORD_BITS && row >> j != 0; j++) {
+        if (dimension == 0) {
+            m[j] = 1;
+        } else if (j < (degree = sampling_directions[dimension - 1].degree)) {
+            m[j] = sampling_directions[dimension - 1].m[j];
+        } else {
+            const unsigned coefficients = sampling_directions[dimension - 1].coefficients;
+            m[j] = m[j - degree] ^ m[j - degree] << degree;
+            for (size_t k = 1; k < degree; k++)
+                if (coefficients >> (degree - 1 - k) & 1)
+                    m[j] ^= m[j - k] << k;
+        }
+        if (row >> j & 1)
+            word ^= m[j] << (WORD_BITS - 1 - j);
+    }
+    return word;
+}
+
+// Fisher and Yates. A word of 32 bits favours no stratum by more than rows / 2^32.
+static void sampling_shuffle(uint64_t seed, uint64_t stream, size_t count, uint32_t *strata) {
+    uint32_t words[4];
+    for (size_t i = 0; i < count; i++) {
+        if (i % 4 == 0)
+            sampling_words(seed, stream, i / 4, words);
+        const size_t k = (size_t)((uint64_t)words[i % 4] * (i + 1) >> 32);
+        strata[i] = strata[k];
+        strata[k] = (uint32_t)i;
+    }
+}
+
+Status sampling_make(int method, uint64_t seed, size_t rows, size_t dimensions,
+                     Sampling *sampling) {
+    *sampling = (Sampling){.method = method, .seed = seed, .rows = rows};
+    if (method != SAMPLING_LATIN_HYPERCUBE)
+        return STATUS_OK;
+    sampling->strata = calloc(rows * dimensions + 1, sizeof *sampling->strata);
+    TRY(status_made(sampling->strata != NULL));
+    for (size_t i = 0; i < dimensions; i++)
+        sampling_shuffle(seed, STREAM_STRATA + i, rows, sampling->strata + i * rows);
+    return STATUS_OK;
+}
+
+void sampling_clear(Sampling *sampling) {
+    free(sampling->strata);
+    *sampling = (Sampling){0};
+}
+
+double sampling_coordinate(const Sampling *sampling, size_t row, size_t dimension) {
+    if (sampling->method == SAMPLING_SOBOL) {
+        uint32_t shift[4];
+        sampling_words(sampling->seed, STREAM_SHIFT + dimension, 0, shift);
+        return ((double)(sampling_sobol_word(row, dimension) ^ shift[0]) + 0.5) * 0x1p-32;
+    }
+    const double within = sampling_uniform(sampling->seed, STREAM_POINTS + dimension, row);
+    if (sampling->method != SAMPLING_LATIN_HYPERCUBE)
+        return within;
+    const double place = ((double)sampling->strata[dimension * sampling->rows + row] + within) /
+                         (double)sampling->rows;
+    return place == 0.5 ? 0.5 - 0x1p-53 : place;
+}
+
+double sampling_draw_again(const Sampling *sampling, size_t row, size_t dimension, uint64_t again) {
+    return sampling_uniform(sampling->seed, STREAM_AGAIN + dimension,
+                            (uint64_t)row << AGAIN_BITS | again);
+}
+
+enum { DRAWS_MAX = 64 }; // of one number
 
 static const char place_of_all[] = "/study/inputs";
 static const char *const input_distribution_names[] = {"normal",     "lognormal", "uniform",
@@ -22,200 +149,159 @@ static const char *const input_distribution_names[] = {"normal",     "lognormal"
 
 // clang-format off
 const Field uncertain_input_fields[] = {
-    FIELD_TEXT(UncertainInput, pointer, 200, PRESENCE_OPTIONAL, 0, "JSON Pointer to the real number that is uncertain, such as /dampers/0/clearance; of distribution material to a buffer"),
-    FIELD_TEXTS(UncertainInput, pointers, NULL, NULL, POINTERS_MAX, PRESENCE_OPTIONAL, 0, "in place of pointer: several members that all get the same value"),
-    FIELD_CHOICE(UncertainInput, distribution, input_distribution_names, REQUIRED, "normal: mean and deviation; lognormal: median and log_deviation; uniform: from and to; triangular: from, mode and to; material: e and T_c of a buffer, times log-normal factors of mean 1 and the relative deviations that its material records"),
+    FIELD_BASE(UncertainInput, axis, study_range_fields),
+    FIELD_CHOICE(UncertainInput, distribution, input_distribution_names, REQUIRED, "normal: mean and deviation; lognormal: median and log_deviation; uniform: from and to; triangular: from, mode and to; material: e and T_c of the buffer at pointer, times log-normal factors of mean 1 and the relative deviations that its material records"),
     FIELD_REAL(UncertainInput, mean, NULL, ANY, OPTIONAL, "of normal"),
     FIELD_REAL(UncertainInput, deviation, NULL, ABOVE(0), OPTIONAL, "standard deviation of normal"),
     FIELD_REAL(UncertainInput, median, NULL, ABOVE(0), OPTIONAL, "of lognormal"),
     FIELD_REAL(UncertainInput, log_deviation, NULL, ABOVE(0), OPTIONAL, "of lognormal: standard deviation of the natural logarithm"),
-    FIELD_REAL(UncertainInput, from, NULL, ANY, OPTIONAL, "smallest value of uniform or triangular"),
     FIELD_REAL(UncertainInput, mode, NULL, ANY, OPTIONAL, "most probable value of triangular"),
-    FIELD_REAL(UncertainInput, to, NULL, ANY, OPTIONAL, "largest value of uniform or triangular"),
     FIELD_REAL(UncertainInput, restitution_deviation, NULL, WITHIN(0, 1), OPTIONAL, "of material: relative standard deviation of the restitution; if absent the recorded one, 0: exact"),
     FIELD_REAL(UncertainInput, contact_time_deviation, NULL, WITHIN(0, 1), OPTIONAL, "of material: likewise of the contact time"),
     FIELD_END
 };
 // clang-format on
 
-// Rows of the parameters that each distribution has, from its first.
-static const struct {
-    const char *first;
-    size_t count;
-} input_parameters[] = {
-    [INPUT_NORMAL] = {"mean", 2},
-    [INPUT_LOGNORMAL] = {"median", 2},
-    [INPUT_UNIFORM] = {"from", 3}, // without the mode
-    [INPUT_TRIANGULAR] = {"from", 3},
-    [INPUT_MATERIAL] = {"restitution_deviation", 2}, // both are optional
+static const char *const input_parameters[][3] = {
+    [INPUT_NORMAL] = {"mean", "deviation"},
+    [INPUT_LOGNORMAL] = {"median", "log_deviation"},
+    [INPUT_UNIFORM] = {"from", "to"},
+    [INPUT_TRIANGULAR] = {"from", "to", "mode"},
+    [INPUT_MATERIAL] = {"restitution_deviation", "contact_time_deviation"}, // both are optional
 };
 
-static size_t uncertain_input_pointers(const UncertainInput *input) {
-    return input->pointer != NULL ? 1 : input->pointers.count;
+static bool input_has_parameter(int distribution, const char *name) {
+    bool has = false;
+    for (size_t i = 0; i < COUNT(input_parameters[0]); i++)
+        has = has || text_same(input_parameters[distribution][i], name);
+    return has;
 }
 
-const char *uncertain_input_pointer(const UncertainInput *input, size_t index) {
-    return input->pointer != NULL ? input->pointer : input->pointers.at[index];
-}
-
-static JsonPointer uncertain_input_place(const UncertainInput *input, size_t number, size_t index) {
-    const JsonPointer own = json_pointer_at(place_of_all, number);
-    return input->pointer != NULL ? json_pointer_of(own.at, "pointer")
-                                  : json_pointer_at(json_pointer_of(own.at, "pointers").at, index);
-}
-
-static Status uncertain_input_check_parameters(const UncertainInput *input, size_t number,
+static Status uncertain_input_check_parameters(const UncertainInput *input, const char *place,
                                                Problem *problem) {
-    const JsonPointer own = json_pointer_at(place_of_all, number);
-    const Field *all = fields_find(uncertain_input_fields, "mean", NULL),
-                *first = fields_find(uncertain_input_fields,
-                                     input_parameters[input->distribution].first, NULL);
+    const double from = input->axis.from, to = input->axis.to;
     Status status = STATUS_OK;
-    for (const Field *field = all; field < all + PARAMETERS; field++) {
-        const bool is_given = !field_is_absent(field, input),
-                   is_own = field >= first &&
-                            field < first + input_parameters[input->distribution].count &&
-                            !(input->distribution == INPUT_UNIFORM && field == first + 1);
-        if (is_given != is_own && (is_given || input->distribution != INPUT_MATERIAL))
+    for (size_t i = 0; i < COUNT(input_parameters) * COUNT(input_parameters[0]); i++) {
+        const char *name =
+            input_parameters[i / COUNT(input_parameters[0])][i % COUNT(input_parameters[0])];
+        if (name == NULL)
+            continue;
+        size_t offset = 0;
+        const Field *field = fields_find(uncertain_input_fields, name, &offset);
+        const bool is_given = !field_is_absent(field, (const char *)input + offset);
+        if (is_given != input_has_parameter(input->distribution, name) &&
+            (is_given || input->distribution != INPUT_MATERIAL))
             status =
-                json_pointer_fault(problem, own.at, field->name, "%s by distribution %s",
+                json_pointer_fault(problem, place, name, "%s by distribution %s",
                                    is_given ? "must be left out: it is not used" : "is required",
                                    input_distribution_names[input->distribution]);
     }
-    if (input->from >= input->to)
-        status = json_pointer_fault(problem, own.at, "to", "must be above from, %s",
-                                    real_text(input->from).at);
-    if (input->mode < input->from || input->mode > input->to)
-        status = json_pointer_fault(problem, own.at, "mode", "must be within from and to");
+    if (from >= to)
+        status =
+            json_pointer_fault(problem, place, "to", "must be above from, %s", real_text(from).at);
+    if (input->mode < from || input->mode > to)
+        status = json_pointer_fault(problem, place, "mode", "must be within from and to");
     return status;
 }
 
-static Status uncertain_input_check_overlap(const UncertainInputs *inputs, size_t number,
-                                            size_t index, Problem *problem) {
-    const UncertainInput *input = &inputs->at[number];
-    const char *pointer = uncertain_input_pointer(input, index);
-    for (size_t i = 0; i <= number; i++)
-        for (size_t k = 0; k < (i < number ? uncertain_input_pointers(&inputs->at[i]) : index); k++)
-            if (json_pointer_overlaps(uncertain_input_pointer(&inputs->at[i], k), pointer))
-                return problem_add(problem, STATUS_INVALID,
-                                   uncertain_input_place(input, number, index).at,
-                                   "is also set by input %zu: give one input each", i);
-    return STATUS_OK;
+// Index of the given buffer that a pointer such as /dampers/0/left_buffer designates, among the
+// three of each damper; SIZE_MAX: none.
+static size_t input_buffer_index(const Simulation *simulation, const char *pointer) {
+    const Dampers *dampers = &simulation->scene.dampers;
+    for (size_t i = 0; i < SENSITIVITY_BUFFERS * dampers->count; i++) {
+        const size_t damper = i / SENSITIVITY_BUFFERS, place = i % SENSITIVITY_BUFFERS;
+        const JsonPointer own = json_pointer_of(json_pointer_at("/dampers", damper).at,
+                                                sensitivity_buffer_names[place]);
+        if (strcmp(own.at, pointer) == 0 &&
+            buffer_is_given(perturbation_buffer(&dampers->at[damper], place)))
+            return i;
+    }
+    return SIZE_MAX;
 }
 
-// The given buffer that a pointer such as /dampers/0/left_buffer designates; NULL: none. Its place
-// is for perturbation_scale.
-static const Buffer *uncertain_input_buffer(const char *pointer, const Simulation *simulation,
-                                            size_t *damper, size_t *place) {
-    static const char before[] = "/dampers/";
-    static const char *const names[] = {"/buffer", "/left_buffer", "/right_buffer"};
-    char *end;
-    if (strncmp(pointer, before, sizeof before - 1) != 0)
-        return NULL;
-    *damper = strtoul(pointer + sizeof before - 1, &end, 10);
-    for (*place = 0; *place < COUNT(names); ++*place)
-        if (*damper < simulation->scene.dampers.count && strcmp(end, names[*place]) == 0) {
-            const Buffer *buffer =
-                perturbation_buffer(&simulation->scene.dampers.at[*damper], *place);
-            return buffer_is_given(buffer) ? buffer : NULL;
-        }
-    return NULL;
+static const Buffer *input_buffer(const Simulation *simulation, const UncertainInput *input,
+                                  size_t index) {
+    const size_t at = input_buffer_index(simulation, study_axis_pointer(&input->axis, index));
+    return at != SIZE_MAX
+               ? perturbation_buffer(&simulation->scene.dampers.at[at / SENSITIVITY_BUFFERS],
+                                     at % SENSITIVITY_BUFFERS)
+               : NULL;
 }
 
 // Of an input of distribution material.
-static Status uncertain_input_check_buffer(const UncertainInput *input, size_t number, size_t index,
-                                           const Simulation *simulation, Problem *problem) {
-    const JsonPointer place = uncertain_input_place(input, number, index);
-    size_t at[2];
-    const Buffer *buffer = uncertain_input_buffer(uncertain_input_pointer(input, index), simulation,
-                                                  &at[0], &at[1]),
-                 *first = uncertain_input_buffer(uncertain_input_pointer(input, 0), simulation,
-                                                 &at[0], &at[1]);
+static Status uncertain_input_check_buffer(const UncertainInput *input, size_t index,
+                                           const Simulation *simulation, const char *place,
+                                           Problem *problem) {
+    const Buffer *buffer = input_buffer(simulation, input, index),
+                 *first = input_buffer(simulation, input, 0);
     if (buffer == NULL)
-        return problem_add(problem, STATUS_INVALID, place.at,
+        return problem_add(problem, STATUS_INVALID, place,
                            "must designate a given buffer for distribution material: "
                            "/dampers/0/buffer where both stops have the same");
     if (first != NULL && !text_same(first->material, buffer->material))
-        return problem_add(problem, STATUS_INVALID, place.at,
+        return problem_add(problem, STATUS_INVALID, place,
                            "must have the material of the first one: give an input each");
     return STATUS_OK;
 }
 
-// Of other distributions. The spectra and histories of all runs must have the same shape, hence
-// members of the scene's parts alone.
-static Status uncertain_input_check_number(const UncertainInput *input, size_t number, size_t index,
-                                           const Simulation *simulation, Problem *problem) {
-    static const char *const parts[] = {"/structure/", "/dampers/", "/excitation/", "/contact/"};
-    const JsonPointer place = uncertain_input_place(input, number, index);
-    const char *pointer = uncertain_input_pointer(input, index);
+// Of other distributions.
+static Status uncertain_input_check_number(const UncertainInput *input, size_t index,
+                                           const Simulation *simulation, const char *place,
+                                           Problem *problem) {
     char why[JSON_POINTER_MESSAGE_MAX];
-    bool is_tag, is_part = false;
-    const Field *field = json_pointer_find(simulation_fields, simulation, pointer, &is_tag, why);
+    bool is_tag;
+    const Field *field = json_pointer_find(simulation_fields, simulation,
+                                           study_axis_pointer(&input->axis, index), &is_tag, why);
     if (field == NULL)
-        return problem_add(problem, STATUS_INVALID, place.at, "%s", why);
-    for (size_t i = 0; i < COUNT(parts); i++)
-        is_part = is_part || strncmp(pointer, parts[i], strlen(parts[i])) == 0;
-    if (!is_part)
-        return problem_add(problem, STATUS_INVALID, place.at,
-                           "must be below /structure, /dampers, /excitation or /contact");
-    if (is_tag || (field->kind != FIELD_KIND_REAL && field->kind != FIELD_KIND_REALS &&
-                   field->kind != FIELD_KIND_ROWS))
-        return problem_add(
-            problem, STATUS_INVALID, place.at, "must designate a real number%s",
-            field->kind == FIELD_KIND_ITEM ? "; a buffer can have the distribution material" : "");
-    return STATUS_OK;
-}
-
-static Status uncertain_input_check(const UncertainInputs *inputs, size_t number,
-                                    const Simulation *simulation, Problem *problem) {
-    const UncertainInput *input = &inputs->at[number];
-    Status status = uncertain_input_check_parameters(input, number, problem);
-    if ((input->pointer != NULL) == (input->pointers.count > 0))
-        return problem_add(problem, STATUS_INVALID, json_pointer_at(place_of_all, number).at,
-                           input->pointer != NULL
-                               ? "has a pointer and pointers: leave one of them out"
-                               : "needs a pointer, or pointers of tied members");
-    for (size_t i = 0; i < uncertain_input_pointers(input); i++) {
-        Status own = input->distribution == INPUT_MATERIAL
-                         ? uncertain_input_check_buffer(input, number, i, simulation, problem)
-                         : uncertain_input_check_number(input, number, i, simulation, problem);
-        if (own == STATUS_OK)
-            own = uncertain_input_check_overlap(inputs, number, i, problem);
-        status = study_first_failure(status, own);
-    }
-    return status;
+        return problem_add(problem, STATUS_INVALID, place, "%s", why);
+    if (study_field_is_real(field, is_tag))
+        return STATUS_OK;
+    return problem_add(
+        problem, STATUS_INVALID, place, "must designate a real number%s",
+        field->kind == FIELD_KIND_ITEM ? "; a buffer can have the distribution material" : "");
 }
 
 // Fills in the recorded deviations of a material; 0: exact, or not a number of this scene.
-static Status uncertain_input_fill(UncertainInput *input, size_t number,
-                                   const Simulation *simulation, Problem *problem) {
-    static const char *const names[] = {"restitution_deviation", "contact_time_deviation"};
-    const JsonPointer own = json_pointer_at(place_of_all, number);
-    size_t at[2];
-    const Buffer *buffer =
-        uncertain_input_buffer(uncertain_input_pointer(input, 0), simulation, &at[0], &at[1]);
-    double *const deviations[] = {&input->restitution_deviation, &input->contact_time_deviation};
-    const double recorded[] = {buffer->test.restitution_deviation,
-                               buffer->test.contact_time_deviation};
+static Status uncertain_input_fill(UncertainInput *input, const Simulation *simulation,
+                                   const char *place, Problem *problem) {
+    const Buffer *buffer = input_buffer(simulation, input, 0);
     for (int i = SENSITIVITY_RESTITUTION; i <= SENSITIVITY_CONTACT_TIME; i++) {
-        const char *refused = perturbation_refuse(simulation, i);
-        if (*deviations[i] > 0 && refused != NULL)
-            return json_pointer_fault(problem, own.at, names[i], "must be left out: %s", refused);
-        if (isnan(*deviations[i]))
-            *deviations[i] = recorded[i] > 0 && refused == NULL ? recorded[i] : 0;
-        if (*deviations[i] > 1)
-            return json_pointer_fault_real(problem, own.at, names[i], *deviations[i], NULL,
+        const char *refused = perturbation_refuse(simulation, i),
+                   *name = input_parameters[INPUT_MATERIAL][i];
+        const double recorded = uncertainty_recorded(buffer, i);
+        double *deviation = &input->relative[i];
+        if (*deviation > 0 && refused != NULL)
+            return json_pointer_fault(problem, place, name, "must be left out: %s", refused);
+        if (isnan(*deviation))
+            *deviation = recorded > 0 && refused == NULL ? recorded : 0;
+        if (*deviation > 1)
+            return json_pointer_fault_real(problem, place, name, *deviation, NULL,
                                            "is recorded by %.64s and must be at most 1 to be drawn "
                                            "from: give it",
                                            buffer->material);
     }
-    if (*deviations[0] > 0 || *deviations[1] > 0)
+    if (input->relative[0] > 0 || input->relative[1] > 0)
         return STATUS_OK;
-    return problem_add(problem, STATUS_INVALID, own.at,
+    return problem_add(problem, STATUS_INVALID, place,
                        "has no spread: %.64s records none of the restitution or contact time that "
                        "the scene uses; give restitution_deviation or contact_time_deviation, or "
                        "numbers with another distribution",
                        buffer->material != NULL ? buffer->material : "a buffer without a material");
+}
+
+static Status uncertain_input_complete(UncertainInput *input, const Simulation *simulation,
+                                       const char *place, Problem *problem) {
+    Status status = uncertain_input_check_parameters(input, place, problem);
+    for (size_t i = 0; i < study_axis_pointer_count(&input->axis); i++) {
+        const JsonPointer own = study_axis_place(&input->axis, place, i);
+        status = study_first_failure(
+            status, input->distribution == INPUT_MATERIAL
+                        ? uncertain_input_check_buffer(input, i, simulation, own.at, problem)
+                        : uncertain_input_check_number(input, i, simulation, own.at, problem));
+    }
+    return status == STATUS_OK && input->distribution == INPUT_MATERIAL
+               ? uncertain_input_fill(input, simulation, place, problem)
+               : status;
 }
 
 static double input_normal(double u) {
@@ -225,70 +311,48 @@ static double input_normal(double u) {
 // The quantile of a number.
 static double input_number_value(const InputNumber *number, double u) {
     const UncertainInput *input = number->input;
-    const double width = input->to - input->from;
+    const double from = input->axis.from, to = input->axis.to, width = to - from;
     switch (input->distribution) {
     case INPUT_NORMAL:
         return input->mean + input->deviation * input_normal(u);
     case INPUT_LOGNORMAL:
         return input->median * exp(input->log_deviation * input_normal(u));
     case INPUT_UNIFORM:
-        return input->from + width * u;
+        return from + width * u;
     case INPUT_TRIANGULAR:
-        return u * width < input->mode - input->from
-                   ? input->from + sqrt(u * width * (input->mode - input->from))
-                   : input->to - sqrt((1 - u) * width * (input->to - input->mode));
+        return u * width < input->mode - from ? from + sqrt(u * width * (input->mode - from))
+                                              : to - sqrt((1 - u) * width * (to - input->mode));
     default:
-        return perturbation_factor(input_normal(u), number->parameter == SENSITIVITY_RESTITUTION
-                                                        ? input->restitution_deviation
-                                                        : input->contact_time_deviation);
+        return perturbation_factor(input_normal(u), input->relative[number->parameter]);
     }
 }
 
-static bool input_number_is_within(const InputNumber *number, double value) {
-    const Range *range = &number->range;
-    return isfinite(value) && value <= range->max &&
-           (range->is_open_below ? value > range->min : value >= range->min);
-}
-
-static void input_number_limit(InputNumber *number, const Range *range) {
-    Range *own = &number->range;
-    if (range->min > own->min || (range->min == own->min && range->is_open_below)) {
-        own->min = range->min;
-        own->is_open_below = range->is_open_below;
-    }
-    own->max = fmin(own->max, range->max);
-}
-
-static void input_model_add_value(InputModel *model, InputNumber *number,
-                                  const Simulation *simulation) {
-    const UncertainInput *input = number->input;
-    for (size_t i = uncertain_input_pointers(input); i-- > 0;) {
-        char why[JSON_POINTER_MESSAGE_MAX];
-        bool is_tag;
-        const Field *field = json_pointer_find(simulation_fields, simulation,
-                                               uncertain_input_pointer(input, i), &is_tag, why);
-        number->unit = field->unit;
-        input_number_limit(number, &field->range);
-    }
-    model->axes[model->axis_count++] = (StudyAxis){.pointer = input->pointer,
-                                                   .pointers = input->pointers,
-                                                   .from = (double)NAN,
-                                                   .to = (double)NAN,
-                                                   .count = COUNT_ABSENT,
-                                                   .spacing = CHOICE_ABSENT};
-}
-
-// No restitution of its buffers may exceed 1.
-static void input_number_limit_factor(InputNumber *number, const Simulation *simulation) {
-    number->range.min = 0;
-    for (size_t i = 0; i < uncertain_input_pointers(number->input); i++) {
-        size_t damper, place;
-        (void)uncertain_input_buffer(uncertain_input_pointer(number->input, i), simulation, &damper,
-                                     &place);
-        const double max = perturbation_buffer_max(&simulation->scene.dampers.at[damper], place,
-                                                   number->parameter);
-        if (number->parameter == SENSITIVITY_RESTITUTION && max > 0)
-            number->range.max = fmin(number->range.max, 1 / max);
+// The range of the members, which also gives their unit; no restitution may exceed 1.
+static void input_number_limit(InputNumber *number, const Simulation *simulation) {
+    const StudyAxis *axis = &number->input->axis;
+    number->min = number->parameter < 0 ? -(double)INFINITY : 0;
+    number->max = (double)INFINITY;
+    for (size_t i = study_axis_pointer_count(axis); i-- > 0;) {
+        const char *pointer = study_axis_pointer(axis, i);
+        if (number->parameter < 0) {
+            char why[JSON_POINTER_MESSAGE_MAX];
+            bool is_tag;
+            const Field *field =
+                json_pointer_find(simulation_fields, simulation, pointer, &is_tag, why);
+            const Range *range = &field->range;
+            number->unit = field->unit;
+            number->max = fmin(number->max, range->max);
+            number->min =
+                fmax(number->min,
+                     range->is_open_below ? nextafter(range->min, (double)INFINITY) : range->min);
+        } else if (number->parameter == SENSITIVITY_RESTITUTION) {
+            const size_t at = input_buffer_index(simulation, pointer);
+            const double max =
+                perturbation_buffer_max(&simulation->scene.dampers.at[at / SENSITIVITY_BUFFERS],
+                                        at % SENSITIVITY_BUFFERS, SENSITIVITY_RESTITUTION);
+            if (max > 0)
+                number->max = fmin(number->max, 1 / max);
+        }
     }
 }
 
@@ -297,17 +361,15 @@ Status input_model_make(const UncertainInputs *inputs, const Simulation *simulat
     *model = (InputModel){.count = 0};
     for (size_t i = 0; i < inputs->count; i++) {
         const UncertainInput *input = &inputs->at[i];
-        const double deviations[] = {input->restitution_deviation, input->contact_time_deviation};
-        for (int parameter = -1; parameter <= SENSITIVITY_CONTACT_TIME; parameter++) {
-            if (parameter < 0 ? input->distribution == INPUT_MATERIAL
-                              : !(deviations[parameter] > 0))
+        const bool is_material = input->distribution == INPUT_MATERIAL;
+        if (!is_material)
+            model->axes[model->axis_count++] = input->axis;
+        for (int parameter = is_material ? 0 : -1; parameter < (is_material ? 2 : 0); parameter++) {
+            if (is_material && !(input->relative[parameter] > 0))
                 continue;
             InputNumber *number = &model->numbers[model->count++];
-            *number = (InputNumber){input, i, parameter, ANY, NULL};
-            if (parameter < 0)
-                input_model_add_value(model, number, simulation);
-            else
-                input_number_limit_factor(number, simulation);
+            *number = (InputNumber){.input = input, .index = i, .parameter = parameter};
+            input_number_limit(number, simulation);
         }
     }
     return sampling_make(method, seed, rows, tables * model->count, &model->sampling);
@@ -323,12 +385,12 @@ Status input_model_draw(const InputModel *model, size_t number, size_t row, size
     const size_t dimension = number + table * model->count;
     *value = input_number_value(of, sampling_coordinate(&model->sampling, row, dimension));
     for (uint64_t i = 0; i < DRAWS_MAX; i++) {
-        if (input_number_is_within(of, *value))
+        if (isfinite(*value) && *value >= of->min && *value <= of->max)
             return STATUS_OK;
         ++*again;
         *value = input_number_value(of, sampling_draw_again(&model->sampling, row, dimension, i));
     }
-    return problem_add(problem, STATUS_INVALID, uncertain_input_pointer(of->input, 0),
+    return problem_add(problem, STATUS_INVALID, study_axis_pointer(&of->input->axis, 0),
                        "is out of its range in all of %d draws", (int)DRAWS_MAX);
 }
 
@@ -337,13 +399,12 @@ static void input_model_scale(const InputModel *model, const double *values, con
                               Simulation *copy) {
     for (size_t i = 0; i < model->count; i++) {
         const InputNumber *number = &model->numbers[i];
-        for (size_t k = 0; k < uncertain_input_pointers(number->input); k++) {
-            size_t damper, place;
-            if (number->parameter >= 0 &&
-                uncertain_input_buffer(uncertain_input_pointer(number->input, k), base, &damper,
-                                       &place) != NULL)
-                perturbation_scale(&base->scene.dampers.at[damper], place, number->parameter,
-                                   values[i], &copy->scene.dampers.at[damper]);
+        const StudyAxis *axis = &number->input->axis;
+        for (size_t k = 0; k < study_axis_pointer_count(axis) && number->parameter >= 0; k++) {
+            const size_t at = input_buffer_index(base, study_axis_pointer(axis, k)),
+                         damper = at / SENSITIVITY_BUFFERS;
+            perturbation_scale(&base->scene.dampers.at[damper], at % SENSITIVITY_BUFFERS,
+                               number->parameter, values[i], &copy->scene.dampers.at[damper]);
         }
     }
 }
@@ -385,20 +446,26 @@ static Status uncertain_inputs_check_medians(const InputModel *model, const Simu
 }
 
 Status uncertain_inputs_complete(UncertainInputs *inputs, const Simulation *simulation,
-                                 const SimulationLimits *limits, Problem *problem) {
-    Status status = STATUS_OK;
+                                 const SimulationLimits *limits, size_t *numbers,
+                                 Problem *problem) {
+    StudyAxis axes[INPUTS_MAX];
+    for (size_t i = 0; i < inputs->count; i++) {
+        axes[i] = inputs->at[i].axis;
+        axes[i].from = 0; // ranges are those of the distributions
+        axes[i].to = 1;
+    }
+    Status status =
+        study_axes_check(&(StudyAxes){axes, inputs->count}, false, place_of_all, problem);
     for (size_t i = 0; i < inputs->count; i++)
-        status = study_first_failure(status, uncertain_input_check(inputs, i, simulation, problem));
-    TRY(status);
-    for (size_t i = 0; i < inputs->count; i++)
-        if (inputs->at[i].distribution == INPUT_MATERIAL)
-            status = study_first_failure(
-                status, uncertain_input_fill(&inputs->at[i], i, simulation, problem));
+        status = study_first_failure(
+            status, uncertain_input_complete(&inputs->at[i], simulation,
+                                             json_pointer_at(place_of_all, i).at, problem));
     TRY(status);
     InputModel model;
     status = input_model_make(inputs, simulation, SAMPLING_RANDOM, 1, 1, 1, &model);
     if (status == STATUS_OK)
         status = uncertain_inputs_check_medians(&model, simulation, limits, problem);
+    *numbers = model.count;
     input_model_clear(&model);
     return status;
 }

@@ -1,14 +1,43 @@
-// Uncertain inputs of an ensemble: distributions of members of its scene, and the scene of a draw.
+// Uncertain inputs of an ensemble: distributions of members of its scene, the points in the unit
+// cube from which they are drawn, and the scene of a draw.
 #ifndef CORE_STUDY_INPUTS_H
 #define CORE_STUDY_INPUTS_H
 
 #include "core/study/axis.h"
-#include "core/study/sampling.h"
 
 enum {
     INPUTS_MAX = 16,
     INPUT_NUMBERS_MAX = 2 * INPUTS_MAX, // a material has two
+    SAMPLING_SOBOL_DIMENSIONS = 32,
 };
+
+// Points in the unit cube: independent, a Latin hypercube or a Sobol sequence. Each coordinate is a
+// function of its row and dimension: any thread can make any point.
+typedef enum SamplingMethod {
+    SAMPLING_RANDOM,
+    SAMPLING_LATIN_HYPERCUBE,
+    SAMPLING_SOBOL
+} SamplingMethod;
+extern const char *const sampling_names[]; // NULL-terminated
+
+// Points of one seed. Immutable, shared by threads.
+typedef struct Sampling {
+    int method; // SamplingMethod
+    uint64_t seed;
+    size_t rows;
+    uint32_t *strata; // of a Latin hypercube, dimension by dimension a permutation of the rows
+} Sampling;
+
+// Rows up to 2^32, dimensions up to 256, of a Sobol sequence up to SAMPLING_SOBOL_DIMENSIONS.
+// Cleared by sampling_clear. STATUS_NO_MEMORY.
+Status sampling_make(int method, uint64_t seed, size_t rows, size_t dimensions, Sampling *sampling);
+void sampling_clear(Sampling *sampling);
+
+// A coordinate, within 0 and 1, never one of them and never 1/2.
+double sampling_coordinate(const Sampling *sampling, size_t row, size_t dimension);
+
+// Another one, independent of all; `again` from 0 to 2^20 - 1.
+double sampling_draw_again(const Sampling *sampling, size_t row, size_t dimension, uint64_t again);
 
 typedef enum InputDistribution {
     INPUT_NORMAL,
@@ -18,17 +47,20 @@ typedef enum InputDistribution {
     INPUT_MATERIAL,
 } InputDistribution;
 
-// One input: a member of the completed scene, or several that all get the same value. Each
-// distribution has some of the parameters; the others are NAN.
+// One input. Each distribution has some of the parameters; the others are NAN.
 typedef struct UncertainInput {
-    char *pointer; // NULL: `pointers`
-    Texts pointers;
+    StudyAxis axis;   // its members, and from and to of a distribution that has them
     int distribution; // InputDistribution
     double mean, deviation;
     double median, log_deviation; // of the value, and of its natural logarithm
-    double from, mode, to;
+    double mode;
     // Relative standard deviations of e and T_c of a buffer; until completed those of its material.
-    double restitution_deviation, contact_time_deviation;
+    union {
+        struct {
+            double restitution_deviation, contact_time_deviation;
+        };
+        double relative[2]; // by SensitivityParameter
+    };
 } UncertainInput;
 extern const Field uncertain_input_fields[];
 
@@ -37,19 +69,17 @@ typedef struct UncertainInputs {
     size_t count;
 } UncertainInputs;
 
-const char *uncertain_input_pointer(const UncertainInput *input, size_t index); // from 0
-
 // Validates and completes inputs whose rows are valid, of a completed simulation, below
-// "/study/inputs".
+// "/study/inputs". `numbers`: how many are drawn for a run.
 Status uncertain_inputs_complete(UncertainInputs *inputs, const Simulation *simulation,
-                                 const SimulationLimits *limits, Problem *problem);
+                                 const SimulationLimits *limits, size_t *numbers, Problem *problem);
 
 // A number that is drawn: the value of an input, or a factor of a buffer's e or T_c.
 typedef struct InputNumber {
     const UncertainInput *input;
     size_t index;     // of the input
     int parameter;    // of a factor: SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME; else -1
-    Range range;      // numbers outside are drawn again
+    double min, max;  // numbers outside are drawn again
     const char *unit; // NULL: none
 } InputNumber;
 

@@ -20,7 +20,7 @@
 #include <string.h>
 
 #include "core/base/philox.h"
-#include "core/study/sampling.h"
+#include "core/study/inputs.h"
 
 enum {
     ROWS = 160, // of the model at most

@@ -17,7 +17,7 @@
 #include "core/contact/identification.h"
 
 enum { RUNS_MAX = 2000, RUNS_DEFAULT = 200, DEVIATIONS_MAX = 1000 };
-enum { BUFFERS = 3, DRAWS_MAX = 64, STREAM = 0x53454e53 };
+enum { BUFFERS = SENSITIVITY_BUFFERS, DRAWS_MAX = 64, STREAM = 0x53454e53 };
 
 const char *const sensitivity_parameter_names[] = {
     "restitution", "contact_time", "stiffness", "damping", "mass", "clearance", NULL};
@@ -157,7 +157,7 @@ Status perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
 
 // Below, a parameter is SENSITIVITY_RESTITUTION or SENSITIVITY_CONTACT_TIME.
 
-static double uncertainty_recorded(const Buffer *buffer, int parameter) {
+double uncertainty_recorded(const Buffer *buffer, int parameter) {
     return parameter == SENSITIVITY_RESTITUTION ? buffer->test.restitution_deviation
                                                 : buffer->test.contact_time_deviation;
 }
@@ -318,7 +318,7 @@ static Status uncertainty_complete(InputUncertainty *uncertainty, const Simulati
 }
 
 // clang-format off
-static const char *const sensitivity_buffer_names[] = {
+const char *const sensitivity_buffer_names[] = {
     [SENSITIVITY_BOTH] = "buffer", [SENSITIVITY_LEFT] = "left_buffer", [SENSITIVITY_RIGHT] = "right_buffer", NULL};
 
 static const Field sensitivity_spread_fields[] = {

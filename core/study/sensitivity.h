@@ -20,8 +20,10 @@ extern const char *const sensitivity_parameter_names[]; // NULL-terminated
 typedef enum SensitivityBuffer {
     SENSITIVITY_BOTH,
     SENSITIVITY_LEFT,
-    SENSITIVITY_RIGHT
+    SENSITIVITY_RIGHT,
+    SENSITIVITY_BUFFERS
 } SensitivityBuffer;
+extern const char *const sensitivity_buffer_names[]; // NULL-terminated
 
 // Relative standard deviations of one buffer's restitution and contact time; NAN: exact.
 typedef struct InputDeviation {
@@ -57,6 +59,9 @@ typedef struct InputUncertainty {
 // dampers from 0.
 double uncertainty_find(const InputUncertainty *uncertainty, size_t damper,
                         SensitivityBuffer buffer, int parameter);
+
+// That which a buffer's material records; NAN: none.
+double uncertainty_recorded(const Buffer *buffer, int parameter);
 
 // Why a completed simulation has no relative change of a parameter; NULL: it has. A static text.
 const char *perturbation_refuse(const Simulation *simulation, int parameter);

@@ -37,7 +37,7 @@ static UncertainInput *add(StudyRequest *inquiry, const char *pointer, int distr
     UncertainInput *input = list_append(&study_of(inquiry)->inputs, sizeof *input);
     assert_non_null(input);
     assert_int_equal(fields_default(uncertain_input_fields, input), STATUS_OK);
-    assert_int_equal(text_copy(pointer, &input->pointer), STATUS_OK);
+    assert_int_equal(text_copy(pointer, &input->axis.pointer), STATUS_OK);
     input->distribution = distribution;
     switch (distribution) {
     case INPUT_NORMAL:
@@ -50,12 +50,12 @@ static UncertainInput *add(StudyRequest *inquiry, const char *pointer, int distr
         break;
     case INPUT_TRIANGULAR:
         input->mode = c;
-        input->from = a;
-        input->to = b;
+        input->axis.from = a;
+        input->axis.to = b;
         break;
     case INPUT_UNIFORM:
-        input->from = a;
-        input->to = b;
+        input->axis.from = a;
+        input->axis.to = b;
         break;
     default:
         input->restitution_deviation = a;
@@ -132,9 +132,9 @@ TEST(each_row_is_the_scene_with_its_seed_and_its_numbers) {
     inquiry.simulation.output.reduction = false;
     add(&inquiry, "/structure/damping", INPUT_UNIFORM, 0.5, 2, 0);
     UncertainInput *tied = add(&inquiry, NULL, INPUT_TRIANGULAR, 0.5, 0.7, 0.6);
-    assert_int_equal(texts_append(&tied->pointers, "/dampers/0/left_buffer/restitution"),
+    assert_int_equal(texts_append(&tied->axis.pointers, "/dampers/0/left_buffer/restitution"),
                      STATUS_OK);
-    assert_int_equal(texts_append(&tied->pointers, "/dampers/0/right_buffer/restitution"),
+    assert_int_equal(texts_append(&tied->axis.pointers, "/dampers/0/right_buffer/restitution"),
                      STATUS_OK);
     complete(&inquiry);
     Ensemble *answer = make(&inquiry, NULL);
@@ -356,7 +356,7 @@ TEST(senseless_inputs_are_refused) {
     inquiry = make_request(20);
     add(&inquiry, "/dampers/0/buffer/restitution", INPUT_UNIFORM, 0.2, 0.8, 0);
     add(&inquiry, "/dampers/0/buffer", INPUT_MATERIAL, 0.1, NAN, 0);
-    assert_refused(&inquiry, "/study/inputs/1/pointer", "is also set by input 0");
+    assert_refused(&inquiry, "/study/inputs/1/pointer", "is also set by entry 0");
 }
 
 TEST(options_that_do_not_fit_are_refused) {

@@ -3,10 +3,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/study/sampling.h"
+#include "core/study/inputs.h"
 #include "tests/support/test.h"
 
-enum { ROWS = 64, DIMENSIONS = 32 };
+enum { ROWS = 64, DIMENSIONS = 32, MANY = 64 };
 
 static Sampling make(int method, uint64_t seed, size_t rows, size_t dimensions) {
     Sampling sampling;
@@ -17,8 +17,8 @@ static Sampling make(int method, uint64_t seed, size_t rows, size_t dimensions) 
 TEST(every_stratum_of_a_latin_hypercube_has_one_point) {
     static const size_t counts[] = {2, 7, ROWS};
     for (size_t n = 0; n < COUNT(counts); n++) {
-        Sampling sampling = make(SAMPLING_LATIN_HYPERCUBE, 3, counts[n], SAMPLING_DIMENSIONS);
-        for (size_t d = 0; d < SAMPLING_DIMENSIONS; d++) {
+        Sampling sampling = make(SAMPLING_LATIN_HYPERCUBE, 3, counts[n], MANY);
+        for (size_t d = 0; d < MANY; d++) {
             bool is_taken[ROWS] = {false};
             for (size_t i = 0; i < counts[n]; i++) {
                 const double place = sampling_coordinate(&sampling, i, d);

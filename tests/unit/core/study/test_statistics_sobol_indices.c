@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/study/sampling.h"
+#include "core/study/inputs.h"
 #include "core/study/statistics.h"
 #include "tests/support/test.h"
 
