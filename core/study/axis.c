@@ -370,3 +370,40 @@ Status study_scene_use_record(Simulation *scene, const PinnedRecord *pinned) {
     TRY(status_made((record->name = strdup(pinned->name)) != NULL));
     return status_made(record_resolve(record, (NamedRecord *)(void *)pinned->named));
 }
+
+static bool reals_are_zero(const Reals *reals) {
+    bool are_zero = true;
+    for (size_t i = 0; i < reals->count; i++)
+        are_zero = are_zero && reals->at[i] == 0;
+    return are_zero;
+}
+
+Status study_suite_prepare(const PinnedRecords *suite, Simulation *simulation, Problem *problem) {
+    const Excitation *excitation = scene_excitation(&simulation->scene);
+    if (excitation != NULL && excitation_kind(excitation) == &excitation_record)
+        return STATUS_OK;
+    if (excitation != NULL &&
+        (excitation_kind(excitation) != &excitation_free ||
+         !reals_are_zero(&excitation->displacement) || !reals_are_zero(&excitation->velocity)))
+        return problem_add(
+            problem, STATUS_INVALID, "/excitation",
+            "would be replaced by the records of the study, is of the kind %s: leave "
+            "it out, or give the start with the kind record",
+            excitation_kind(excitation)->kind.name);
+    return suite->count > 0 && suite->at[0].named != NULL
+               ? study_result(study_scene_use_record(simulation, &suite->at[0]), problem)
+               : STATUS_OK;
+}
+
+Status study_suite_check(const PinnedRecords *suite, const char *place, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 1; i < suite->count; i++) {
+        size_t first = 0;
+        while (first < i && !text_same(suite->at[first].name, suite->at[i].name))
+            first++;
+        if (first < i)
+            status = problem_add(problem, STATUS_INVALID, json_pointer_at(place, i).at,
+                                 "is listed twice, first at %s/%zu", place, first);
+    }
+    return status;
+}

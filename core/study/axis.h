@@ -105,6 +105,13 @@ Status study_scene_make(const Simulation *base, const StudyAxes *axes, const Stu
 // an excitation of another kind is replaced, of a record scale and start stay. STATUS_NO_MEMORY.
 Status study_scene_use_record(Simulation *scene, const PinnedRecord *pinned);
 
+// For a study of a suite of records, before its scene is completed: the first one is the ground
+// motion of the scene's own run, too, unless the scene names one. Refuses any other excitation,
+// which the records would replace, at its place in the scene.
+Status study_suite_prepare(const PinnedRecords *suite, Simulation *simulation, Problem *problem);
+// Validates that no record is listed twice, below `place`.
+Status study_suite_check(const PinnedRecords *suite, const char *place, Problem *problem);
+
 // Where a study names materials and records; the server resolves them at submission.
 typedef struct StudyReferences {
     StudyAxes *axes; // NULL: none, as of the others

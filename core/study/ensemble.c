@@ -81,13 +81,8 @@ static const Field ensemble_trust_fields[] = {
     FIELD_END
 };
 
-static const Field ensemble_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
-    {.name = "first_seed", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of their seeds"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
-    FIELD_END
-};
+static const Field ensemble_failure_fields[] = {STUDY_FAILURE_ROWS("first_seed", "the first of their seeds")};
+static const Field ensemble_runs_fields[] = {STUDY_RUNS_ROWS(ensemble_failure_fields)};
 
 static const Field ensemble_spectrum_fields[] = {
     FIELD_TEXT(RunSpectrum, channel, 0, PRESENCE_OPTIONAL, 0, "channel"),
@@ -149,16 +144,12 @@ static const Field ensemble_target_fields[] = {
 };
 
 static const Field ensemble_answer_fields[] = {
-    FIELD_COUNT(Ensemble, runs, NULL, AT_MIN(1), OPTIONAL, "runs requested"),
+    FIELD_BASE(Ensemble, made, ensemble_runs_fields),
     FIELD_COUNT(Ensemble, first_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the first"),
-    FIELD_COUNT(Ensemble, made, NULL, AT_MIN(0), 0, "runs made"),
-    FIELD_COUNT(Ensemble, failed, NULL, AT_MIN(0), 0, "runs that failed; all numbers below are of the others"),
-    FIELD_REAL(Ensemble, steps, NULL, ANY, 0, "solver steps of all runs"),
     FIELD_REAL(Ensemble, confidence, NULL, ANY, OPTIONAL, "of the intervals of means"),
     FIELD_ITEM_OR_NULL(Ensemble, target, ensemble_target_fields, PRESENCE_OPTIONAL, "result of the target"),
     FIELD_ITEM(Ensemble, statistics, ensemble_statistics_fields, NULL, PRESENCE_DEFAULT, "over the runs"),
     FIELD_ITEM(Ensemble, trust, ensemble_trust_fields, NULL, PRESENCE_DEFAULT, "accuracy of single trajectories"),
-    FIELD_LIST(Ensemble, failures, ensemble_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
     FIELD_REALS(Ensemble, frequency, "Hz", ANY, 0, PRESENCE_OPTIONAL, "of the spectra"),
     FIELD_LIST(Ensemble, spectra, ensemble_spectrum_fields, 0, PRESENCE_DEFAULT, "mean densities, channel by channel"),
     FIELD_CHOICE(Ensemble, sampling, sampling_names, OPTIONAL, "points of the inputs' draws"),
@@ -310,32 +301,21 @@ static Status ensemble_draw(const InputModel *model, size_t row, bool is_second,
     return status;
 }
 
-// Mean over the scenes of the first draws; that of the base if none of them is valid.
-static Status ensemble_cost_of_draws(const EnsembleStudy *study, const Simulation *base,
-                                     const SimulationLimits *limits, double *steps) {
-    InputModel model;
-    double sum = 0;
-    size_t count = 0;
-    Status status = input_model_make(&study->inputs, base, SAMPLING_RANDOM, study->first_seed,
-                                     COST_SAMPLES, 1, &model);
-    for (size_t i = 0; i < COST_SAMPLES && i < study->runs && status == STATUS_OK; i++) {
-        double values[INPUT_NUMBERS_MAX];
-        uint64_t again[INPUT_NUMBERS_MAX] = {0};
-        Simulation scene = {0};
-        status = ensemble_draw(&model, i, false, SIZE_MAX, values, again, NULL);
-        if (status == STATUS_OK)
-            status = input_model_scene(&model, values, base, limits, &scene, NULL);
-        if (status == STATUS_OK) {
-            sum += simulation_cost(&scene).steps;
-            count++;
-        }
-        simulation_clear(&scene);
-        status = status == STATUS_NO_MEMORY ? status : STATUS_OK;
-    }
-    input_model_clear(&model);
-    if (count > 0)
-        *steps = sum / (double)count;
-    return status;
+// What makes the scenes of draws, to estimate their cost.
+typedef struct EnsembleScenes {
+    const Simulation *base;
+    InputModel model; // none: all are the base
+} EnsembleScenes;
+
+static Status ensemble_scene_of(const void *of, size_t row, const SimulationLimits *limits,
+                                Simulation *scene) {
+    const EnsembleScenes *scenes = of;
+    double values[INPUT_NUMBERS_MAX];
+    uint64_t again[INPUT_NUMBERS_MAX] = {0};
+    if (scenes->model.count == 0)
+        return fields_copy(simulation_fields, scenes->base, scene);
+    TRY(ensemble_draw(&scenes->model, row, false, SIZE_MAX, values, again, NULL));
+    return input_model_scene(&scenes->model, values, scenes->base, limits, scene, NULL);
 }
 
 // Of all runs: how many of them a target needs is unknown before the first are made.
@@ -343,13 +323,17 @@ static Status ensemble_cost(const void *request, const Simulation *simulation,
                             const SimulationLimits *limits, double *steps) {
     const EnsembleStudy *study = request;
     Simulation base;
-    double each = 0;
+    EnsembleScenes scenes = {.base = &base};
+    *steps = 0;
     Status status = ensemble_base(study, simulation, &base);
     if (status == STATUS_OK)
-        each = simulation_cost(&base).steps;
-    if (status == STATUS_OK && study->inputs.count > 0)
-        status = ensemble_cost_of_draws(study, &base, limits, &each);
-    *steps = (double)study->runs * (double)ensemble_sample_runs(study, simulation) * each;
+        status = input_model_make(&study->inputs, &base, SAMPLING_RANDOM, study->first_seed,
+                                  (size_t)study->runs, 1, &scenes.model);
+    if (status == STATUS_OK)
+        status = study_sample_cost(ensemble_scene_of, &scenes, (size_t)study->runs,
+                                   study->inputs.count > 0 ? COST_SAMPLES : 1, limits, steps);
+    *steps *= (double)ensemble_sample_runs(study, simulation);
+    input_model_clear(&scenes.model);
     simulation_clear(&base);
     return status;
 }
@@ -448,14 +432,14 @@ static bool ensemble_has_target(const EnsembleWork *work) {
 }
 
 static size_t ensemble_ended(const EnsembleWork *work) {
-    return (size_t)(work->answer->made - work->answer->failed);
+    return (size_t)(work->answer->made.runs - work->answer->made.failed);
 }
 
 // Checks the error and predicts the number of runs, all of which are then wanted. Runs that failed
 // do not belong to the population.
 static Status ensemble_check_target(EnsembleWork *work) {
     EnsembleTarget *target = &work->answer->target;
-    const size_t failed = (size_t)work->answer->failed, count = ensemble_ended(work),
+    const size_t failed = (size_t)work->answer->made.failed, count = ensemble_ended(work),
                  all = (size_t)work->study->runs - failed;
     RunSpread spread;
     if (work->study->metric == STATISTICS_PSD)
@@ -485,7 +469,7 @@ static Status ensemble_check_target(EnsembleWork *work) {
 // Failed runs postpone the next check: more runs are wanted until then.
 static void ensemble_extend(EnsembleWork *ensemble) {
     StudyWork *work = &ensemble->work;
-    const size_t made = (size_t)ensemble->answer->made;
+    const size_t made = (size_t)ensemble->answer->made.runs;
     const size_t until = made + ensemble->check - ensemble_ended(ensemble);
     if (work->wanted > made)
         return;
@@ -534,16 +518,9 @@ static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
     Ensemble *answer = work->answer;
     const EnsemblePlace place = ensemble_place(work, member);
     RunRecord *run = &part->run;
-    answer->made++;
-    if (run->why != NULL) {
-        answer->failed++;
-        TRY(study_failures_add(&answer->failures, (int)run->status, status_slug(run->status),
-                               place.seed, run->why));
-    } else {
-        answer->steps += run->steps;
-        if (!work->has_force)
-            run->summary.peak_contact_force = (double)NAN;
-    }
+    if (!work->has_force)
+        run->summary.peak_contact_force = (double)NAN;
+    TRY(study_runs_add(&answer->made, run, place.seed));
     for (int metric = 0; metric < STATISTICS_METRICS && work->values != NULL; metric++)
         work->values[member * STATISTICS_METRICS + (size_t)metric] =
             statistics_value(&run->summary, metric);
@@ -551,7 +528,7 @@ static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
         TRY(ensemble_fold_row(work, place.seed, part));
     if (!ensemble_has_target(work))
         return STATUS_OK;
-    if (answer->made == answer->runs || ensemble_ended(work) >= work->check)
+    if (answer->made.runs == work->study->runs || ensemble_ended(work) >= work->check)
         return ensemble_check_target(work);
     ensemble_extend(work);
     return STATUS_OK;
@@ -560,7 +537,7 @@ static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
 static Status ensemble_fill_target(const EnsembleWork *work) {
     EnsembleTarget *target = &work->answer->target;
     const char *name = statistics_metric_names[work->study->metric];
-    const unsigned long long made = (unsigned long long)work->answer->made,
+    const unsigned long long made = (unsigned long long)work->answer->made.runs,
                              all = (unsigned long long)work->study->runs;
     target->error = work->study->target;
     target->metric = work->study->metric;
@@ -620,6 +597,7 @@ static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) 
     for (int metric = 0; metric < STATISTICS_METRICS; metric++)
         TRY(statistics_fill(&answer->table, metric, &answer->statistics.of[metric]));
     statistics_trust(&answer->table, &answer->trust);
+    TRY(study_runs_warn(&answer->made));
     TRY(ensemble_add_indices(work, tools, problem));
     TRY(spectrum_accumulator_report(&work->history, &work->history_like, SPECTRUM_QUANTILES,
                                     tools->progress, &answer->time, &answer->displacement,
@@ -689,7 +667,6 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     work->work.part_bytes = sizeof(EnsemblePart) + sizeof(double) * ((size_t)densities + history);
     work->work.bytes = sizeof(double) * ((size_t)densities * work->kept +
                                          history / 2 * ensemble_kept(study, HISTORY_POINTS));
-    answer->runs = study->runs;
     answer->first_seed = study->first_seed;
     answer->confidence = STATISTICS_CONFIDENCE;
     return STATUS_OK;

@@ -57,14 +57,12 @@ typedef struct EnsembleIndex {
 // The answer.
 typedef struct Ensemble {
     Variant variant;
-    uint64_t runs, first_seed; // requested
-    uint64_t made, failed;
-    double steps;      // solver steps of all runs
-    double confidence; // of the intervals
+    StudyRuns made;
+    uint64_t first_seed; // requested
+    double confidence;   // of the intervals
     EnsembleTarget target;
     EnsembleStatistics statistics;
     RunTrust trust;
-    StudyFailures failures;
     Reals frequency; // [Hz]
     RunSpectra spectra;
     int sampling; // SamplingMethod; CHOICE_ABSENT without inputs, and nothing in the next four

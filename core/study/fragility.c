@@ -14,7 +14,7 @@
 
 enum { COST_RECORDS = 16, NAMES_SHOWN = 3 };
 
-static const double oscillator_steps_max = 1e8;
+static const double oscillator_step = 0.25; // CPU of one, in solver steps
 static const double confidence = 0.95;
 static const char *const fragility_measure_names[] = {"pga", NULL};
 
@@ -27,7 +27,7 @@ static const Field fragility_intensity_fields[] = {
 };
 
 static const Field fragility_levels_fields[] = {
-    FIELD_REALS(FragilityLevels, values, "m/s^2", ABOVE(0), FRAGILITY_LEVELS, PRESENCE_OPTIONAL, "intensities, rising"),
+    FIELD_REALS(FragilityLevels, values, "m/s^2", ANY, FRAGILITY_LEVELS, PRESENCE_OPTIONAL, "intensities above 0, rising"),
     FIELD_REAL(FragilityLevels, from, "m/s^2", ABOVE(0), OPTIONAL, "in place of values: the lowest intensity"),
     FIELD_REAL(FragilityLevels, to, "m/s^2", ABOVE(0), OPTIONAL, "the highest one"),
     FIELD_COUNT(FragilityLevels, count, NULL, WITHIN(2, FRAGILITY_LEVELS), OPTIONAL, "their number, both ends included, at equal differences"),
@@ -82,40 +82,15 @@ static const Field fragility_state_fields[] = {
     FIELD_END
 };
 
-static const Field fragility_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
-    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them, from 0, record by record"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
-    FIELD_END
-};
-
 static const Field fragility_answer_fields[] = {
-    FIELD_COUNT(Fragility, runs, NULL, AT_MIN(0), 0, "runs made"),
-    FIELD_COUNT(Fragility, failed, NULL, AT_MIN(0), 0, "runs that failed"),
-    FIELD_REAL(Fragility, steps, NULL, ANY, 0, "solver steps of all runs"),
-    FIELD_LIST(Fragility, failures, fragility_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
+    FIELD_BASE(Fragility, made, study_runs_fields),
     FIELD_ITEM(Fragility, intensity, fragility_intensity_fields, NULL, PRESENCE_DEFAULT, "measure of the levels"),
     FIELD_LIST(Fragility, curves, fragility_curve_fields, 0, PRESENCE_DEFAULT, "record by record"),
     FIELD_LIST(Fragility, fractiles, fragility_fractile_fields, 0, PRESENCE_DEFAULT, "metric by metric, by rising level"),
     FIELD_LIST(Fragility, limits, fragility_state_fields, 0, PRESENCE_DEFAULT, "limit states: lognormal distributions by maximum likelihood"),
-    FIELD_LIST(Fragility, warnings, warning_fields, 0, PRESENCE_DEFAULT, "what weakens the answer"),
     FIELD_END
 };
 // clang-format on
-
-static size_t fragility_level_count(const FragilityLevels *levels) {
-    return levels->values.count > 0 ? levels->values.count : (size_t)levels->count;
-}
-
-static double fragility_level(const FragilityLevels *levels, size_t index) {
-    if (levels->values.count > 0)
-        return levels->values.at[index];
-    return index + 1 == levels->count
-               ? levels->to
-               : levels->from +
-                     (levels->to - levels->from) / (double)(levels->count - 1) * (double)index;
-}
 
 static const NamedRecord *fragility_record(const FragilityStudy *study, size_t index) {
     return (const NamedRecord *)(const void *)study->records.at[index].named;
@@ -138,19 +113,20 @@ static Status fragility_complete_intensity(FragilityIntensity *intensity, Proble
     return STATUS_OK;
 }
 
-static Status fragility_check_levels(const FragilityLevels *levels, Problem *problem) {
+static Status fragility_complete_levels(FragilityLevels *levels, Problem *problem) {
     const char *place = "/study/levels";
     const bool has_range =
         !isnan(levels->from) || !isnan(levels->to) || levels->count != COUNT_ABSENT;
-    if (levels->values.count > 0 && has_range)
+    Reals *values = &levels->values;
+    if (values->count > 0 && has_range)
         return problem_add(problem, STATUS_INVALID, place,
                            "has values and a range: leave out values, or from, to and count");
-    for (size_t i = 1; i < levels->values.count; i++)
-        if (!(levels->values.at[i] > levels->values.at[i - 1]))
-            return problem_add_real(problem, STATUS_INVALID, json_pointer_at("/study/levels", i).at,
-                                    levels->values.at[i], "m/s^2",
-                                    "must be above the one before it: levels rise");
-    if (levels->values.count > 0)
+    for (size_t i = 0; i < values->count; i++)
+        if (!(values->at[i] > (i > 0 ? values->at[i - 1] : 0)))
+            return problem_add_real(
+                problem, STATUS_INVALID, json_pointer_at(place, i).at, values->at[i], "m/s^2",
+                i > 0 ? "must be above the one before it: levels rise" : "must be above 0 m/s^2");
+    if (values->count > 0)
         return STATUS_OK;
     if (isnan(levels->from) || isnan(levels->to) || levels->count == COUNT_ABSENT)
         return problem_add(problem, STATUS_INVALID, place,
@@ -159,24 +135,25 @@ static Status fragility_check_levels(const FragilityLevels *levels, Problem *pro
         return problem_add(problem, STATUS_INVALID, place,
                            "from must be below to, is %s m/s^2, to is %s m/s^2",
                            real_text(levels->from).at, real_text(levels->to).at);
+    const size_t last = (size_t)levels->count - 1;
+    if (!reals_allocate(values, last + 1))
+        return STATUS_NO_MEMORY;
+    for (size_t i = 0; i <= last; i++)
+        values->at[i] = levels->from + (levels->to - levels->from) / (double)last * (double)i;
+    values->at[last] = levels->to;
+    levels->from = levels->to = (double)NAN;
+    levels->count = COUNT_ABSENT;
     return STATUS_OK;
 }
 
 static Status fragility_check_records(const FragilityStudy *study, Problem *problem) {
-    Status status = STATUS_OK;
+    Status status = study_suite_check(&study->records, "/study/records", problem);
     for (size_t i = 0; i < study->records.count; i++) {
-        const JsonPointer place = json_pointer_at("/study/records", i);
         const NamedRecord *record = fragility_record(study, i);
-        size_t first = 0;
-        while (first < i && strcmp(study->records.at[first].name, study->records.at[i].name) != 0)
-            first++;
         if (record == NULL)
             status = STATUS_INVALID; // reported where the names are resolved
-        else if (first < i)
-            status = problem_add(problem, STATUS_INVALID, place.at,
-                                 "is listed twice, first at /study/records/%zu", first);
         else if (!(record->peak > 0))
-            status = problem_add(problem, STATUS_INVALID, place.at,
+            status = problem_add(problem, STATUS_INVALID, json_pointer_at("/study/records", i).at,
                                  "is a base at rest, which no factor scales to a level");
     }
     return status;
@@ -199,25 +176,8 @@ static Status fragility_check_limits(const FragilityStudy *study, const Simulati
     return status;
 }
 
-// The time to find the intensities.
-static Status fragility_check_oscillators(const FragilityStudy *study, Problem *problem) {
-    double steps = 0;
-    for (size_t i = 0; i < study->records.count && !isnan(study->intensity.period); i++) {
-        const NamedRecord *record = fragility_record(study, i);
-        steps += response_spectrum_steps(&study->intensity.period, 1, record->samples.count,
-                                         record->interval);
-    }
-    if (steps <= oscillator_steps_max)
-        return STATUS_OK;
-    return problem_add_real(problem, STATUS_INVALID, "/study/intensity/period",
-                            study->intensity.period, "s",
-                            "would take %.3g steps of an oscillator to measure the records, at "
-                            "most %.3g are allowed: take a longer period or fewer records",
-                            steps, oscillator_steps_max);
-}
-
 static Status fragility_check_runs(const FragilityStudy *study, Problem *problem) {
-    const size_t levels = fragility_level_count(&study->levels);
+    const size_t levels = study->levels.values.count;
     if (study->records.count * levels <= FRAGILITY_RUNS)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study/levels",
@@ -251,11 +211,10 @@ static Status fragility_complete(void *request, const Simulation *simulation,
                                  const SimulationLimits *limits, Problem *problem) {
     FragilityStudy *study = request;
     const Status faults[] = {fragility_complete_intensity(&study->intensity, problem),
-                             fragility_check_levels(&study->levels, problem),
+                             fragility_complete_levels(&study->levels, problem),
                              fragility_check_limits(study, simulation, problem),
                              fragility_check_records(study, problem)};
     TRY(status_first(faults, COUNT(faults)));
-    TRY(fragility_check_oscillators(study, problem));
     TRY(fragility_check_runs(study, problem));
     Simulation base = {0}, scene = {0};
     Status status = fragility_base(study, simulation, &base);
@@ -266,32 +225,42 @@ static Status fragility_complete(void *request, const Simulation *simulation,
     return status;
 }
 
-// From a sample of the records.
+// What makes a scene of any record.
+typedef struct FragilityScenes {
+    const FragilityStudy *study;
+    const Simulation *base;
+} FragilityScenes;
+
+static Status fragility_scene_of(const void *of, size_t record, const SimulationLimits *limits,
+                                 Simulation *scene) {
+    const FragilityScenes *scenes = of;
+    return fragility_make_scene(scenes->base, &scenes->study->records.at[record], 1, limits, scene,
+                                NULL);
+}
+
+// The time to measure the records counts too.
 static Status fragility_cost(const void *request, const Simulation *simulation,
                              const SimulationLimits *limits, double *steps) {
     const FragilityStudy *study = request;
-    const size_t count = study->records.count,
-                 samples = count < COST_RECORDS ? count : COST_RECORDS;
     Simulation base = {0};
-    double sum = 0;
-    size_t made = 0;
+    *steps = 0;
     Status status = fragility_base(study, simulation, &base);
-    for (size_t i = 0; i < samples && status == STATUS_OK; i++) {
-        Simulation scene = {0};
-        status = fragility_make_scene(&base, &study->records.at[i * count / samples], 1, limits,
-                                      &scene, NULL);
-        if (status == STATUS_OK) {
-            sum += simulation_cost(&scene).steps;
-            made++;
-        }
-        simulation_clear(&scene);
-        status = status == STATUS_NO_MEMORY ? status : STATUS_OK;
-    }
+    if (status == STATUS_OK)
+        status = study_sample_cost(fragility_scene_of, &(FragilityScenes){study, &base},
+                                   study->records.count, COST_RECORDS, limits, steps);
     simulation_clear(&base);
-    *steps = made > 0 ? sum / (double)made * (double)count *
-                            (double)fragility_level_count(&study->levels)
-                      : 0;
+    *steps *= (double)study->levels.values.count;
+    for (size_t i = 0; i < study->records.count && !isnan(study->intensity.period); i++) {
+        const NamedRecord *record = fragility_record(study, i);
+        *steps +=
+            oscillator_step * response_spectrum_steps(&study->intensity.period, 1,
+                                                      record->samples.count, record->interval);
+    }
     return status;
+}
+
+static Status fragility_prepare(const void *request, Simulation *simulation, Problem *problem) {
+    return study_suite_prepare(&((const FragilityStudy *)request)->records, simulation, problem);
 }
 
 static void fragility_references(void *request, StudyReferences *references) {
@@ -335,7 +304,7 @@ static Status fragility_measure(FragilityWork *work, const StudyTools *tools, Pr
         curve->points.count = work->levels;
         for (size_t l = 0; l < work->levels; l++) {
             FragilityPoint *point = &curve->points.at[l];
-            point->level = fragility_level(&work->study->levels, l);
+            point->level = work->study->levels.values.at[l];
             for (int m = 0; m < STUDY_METRIC_COUNT; m++)
                 point->metrics.of[m] = (double)NAN;
         }
@@ -357,7 +326,7 @@ static Status fragility_warn_of_ends(FragilityWork *work) {
     }
     if (count == 0)
         return STATUS_OK;
-    return warnings_add(&work->answer->warnings, "/duration",
+    return warnings_add(&work->answer->made.warnings, "/duration",
                         "ends before %zu of the records (%s%s): their ends are left out", count,
                         names, count > NAMES_SHOWN ? ", ..." : "");
 }
@@ -366,7 +335,7 @@ static Status fragility_begin(void *of, const StudyTools *tools, Problem *proble
     FragilityWork *work = of;
     work->study = work->work.study;
     work->answer = work->work.answer;
-    work->levels = fragility_level_count(&work->study->levels);
+    work->levels = work->study->levels.values.count;
     work->answer->intensity = work->study->intensity;
     TRY(fragility_base(work->study, work->work.simulation, &work->base));
     TRY(fragility_measure(work, tools, problem));
@@ -392,13 +361,9 @@ static Status fragility_fold(void *of, size_t member, StudyPart *part) {
     FragilityWork *work = of;
     Fragility *answer = work->answer;
     const RunRecord *run = &part->run;
-    answer->runs++;
-    if (run->status != STATUS_OK) {
-        answer->failed++;
-        return study_failures_add(&answer->failures, (int)run->status, status_slug(run->status),
-                                  member, run->why);
-    }
-    answer->steps += run->steps;
+    TRY(study_runs_add(&answer->made, run, member));
+    if (run->status != STATUS_OK)
+        return STATUS_OK;
     answer->curves.at[member / work->levels].points.at[member % work->levels].metrics =
         study_metrics_of(run);
     return STATUS_OK;
@@ -421,22 +386,22 @@ static size_t fragility_values(const Fragility *answer, size_t level, int metric
 // Of metrics that are known somewhere.
 static Status fragility_add_fractiles(FragilityWork *work, int metric, double *values) {
     Fragility *answer = work->answer;
+    const size_t before = answer->fractiles.count;
     size_t known = 0;
-    for (size_t l = 0; l < work->levels && known == 0; l++)
-        known = fragility_values(answer, l, metric, values);
-    for (size_t l = 0; l < work->levels && known > 0; l++) {
+    for (size_t l = 0; l < work->levels; l++) {
         const size_t count = fragility_values(answer, l, metric, values);
         FragilityFractile *fractile = list_append(&answer->fractiles, sizeof *fractile);
         TRY(status_made(fractile != NULL));
-        *fractile = (FragilityFractile){metric,      answer->curves.at[0].points.at[l].level,
-                                        count,       (double)NAN,
-                                        (double)NAN, (double)NAN};
-        if (count == 0)
-            continue;
-        fractile->p16 = statistics_quantile(values, count, 0.16);
-        fractile->p50 = statistics_quantile(values, count, 0.5);
-        fractile->p84 = statistics_quantile(values, count, 0.84);
+        known += count;
+        *fractile = (FragilityFractile){metric,
+                                        work->study->levels.values.at[l],
+                                        count,
+                                        statistics_quantile(values, count, 0.16),
+                                        statistics_quantile(values, count, 0.5),
+                                        statistics_quantile(values, count, 0.84)};
     }
+    if (known == 0)
+        answer->fractiles.count = before;
     return STATUS_OK;
 }
 
@@ -486,7 +451,7 @@ static Status fragility_add_state(FragilityWork *work, size_t index, CensoredNum
     }
     LognormalFit fit;
     if (!lognormal_fit(intervals, count, confidence, &fit))
-        return warnings_add(&answer->warnings, json_pointer_at("/study/limits", index).at,
+        return warnings_add(&answer->made.warnings, json_pointer_at("/study/limits", index).at,
                             "median and dispersion are unknown: %s",
                             fragility_reason(intervals, count, state->exceeded));
     state->median = fit.median;
@@ -513,7 +478,7 @@ static Status fragility_end(void *of, const StudyTools *tools, Problem *problem)
     }
     free(values);
     free(intervals);
-    return status;
+    return status == STATUS_OK ? study_runs_warn(&work->answer->made) : status;
 }
 
 static void fragility_free(void *of) {
@@ -529,6 +494,7 @@ const StudyKind study_fragility = {
                             fragility_answer_fields, sizeof(Fragility)},
     .shorten = "take fewer records or levels, or a shorter duration",
     .references = fragility_references,
+    .prepare = fragility_prepare,
     .max_runs = 1000,
     .complete = fragility_complete,
     .cost = fragility_cost,

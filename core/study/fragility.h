@@ -3,7 +3,6 @@
 #ifndef CORE_STUDY_FRAGILITY_H
 #define CORE_STUDY_FRAGILITY_H
 
-#include "core/base/report.h"
 #include "core/study/axis.h"
 #include "core/study/statistics.h"
 
@@ -21,7 +20,7 @@ typedef struct FragilityIntensity {
     double damping_ratio; // of the oscillator
 } FragilityIntensity;
 
-// Values or a range [m/s^2].
+// A range becomes values when it is completed [m/s^2].
 typedef struct FragilityLevels {
     Reals values;
     double from, to;
@@ -33,18 +32,16 @@ typedef struct FragilityLimit {
     double value;
 } FragilityLimit;
 
-typedef struct FragilityLimits {
-    FragilityLimit *at;
-    size_t count;
-} FragilityLimits;
-
 // The request.
 typedef struct FragilityStudy {
     Variant variant;
     PinnedRecords records;
     FragilityIntensity intensity;
     FragilityLevels levels;
-    FragilityLimits limits;
+    struct {
+        FragilityLimit *at;
+        size_t count;
+    } limits;
 } FragilityStudy;
 
 // A run: a record at a level.
@@ -53,21 +50,14 @@ typedef struct FragilityPoint {
     StudyMetrics metrics; // NAN: unknown
 } FragilityPoint;
 
-typedef struct FragilityPoints {
-    FragilityPoint *at;
-    size_t count;
-} FragilityPoints;
-
 typedef struct FragilityCurve {
     char *record;
     double intensity; // as it was recorded [m/s^2]
-    FragilityPoints points;
+    struct {
+        FragilityPoint *at;
+        size_t count;
+    } points;
 } FragilityCurve;
-
-typedef struct FragilityCurves {
-    FragilityCurve *at;
-    size_t count;
-} FragilityCurves;
 
 // Over the records at one level.
 typedef struct FragilityFractile {
@@ -76,11 +66,6 @@ typedef struct FragilityFractile {
     uint64_t count; // of records whose value is known
     double p16, p50, p84;
 } FragilityFractile;
-
-typedef struct FragilityFractiles {
-    FragilityFractile *at;
-    size_t count;
-} FragilityFractiles;
 
 // The distribution of the level at which a record first exceeds the limit.
 typedef struct FragilityState {
@@ -93,22 +78,23 @@ typedef struct FragilityState {
     Reals dispersion_interval_95;
 } FragilityState;
 
-typedef struct FragilityStates {
-    FragilityState *at;
-    size_t count;
-} FragilityStates;
-
 // The answer.
 typedef struct Fragility {
     Variant variant;
-    uint64_t runs, failed;
-    double steps; // solver steps of all runs
-    StudyFailures failures;
+    StudyRuns made;
     FragilityIntensity intensity;
-    FragilityCurves curves;
-    FragilityFractiles fractiles;
-    FragilityStates limits;
-    Warnings warnings;
+    struct {
+        FragilityCurve *at;
+        size_t count;
+    } curves;
+    struct {
+        FragilityFractile *at;
+        size_t count;
+    } fractiles;
+    struct {
+        FragilityState *at;
+        size_t count;
+    } limits;
 } Fragility;
 
 #endif

@@ -174,6 +174,8 @@ static Status statistics_collect(const RunTable *table, int metric, Values *valu
 }
 
 double statistics_quantile(const double *sorted, size_t count, double share) {
+    if (count == 0)
+        return (double)NAN;
     const double place = share * (double)(count - 1);
     const size_t below = (size_t)place;
     const double from = sorted[below], to = below + 1 < count ? sorted[below + 1] : from;

@@ -122,7 +122,7 @@ typedef struct RunTrust {
 // One metric of a summary; NAN: unknown.
 double statistics_value(const Summary *summary, int metric);
 
-// Quantile of sorted values, at least one, linear between order statistics as numpy.quantile.
+// Quantile of sorted values, linear between order statistics as numpy.quantile; NAN of none.
 double statistics_quantile(const double *sorted, size_t count, double share);
 
 // Fills the statistics of a metric. `statistic` holds its defaults, which remain where the known

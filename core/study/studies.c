@@ -59,7 +59,11 @@ static Status studies_check_cost(const StudyRequest *request, const SimulationLi
 
 Status study_request_complete(StudyRequest *request, const SimulationLimits *limits,
                               Warnings *warnings, Problem *problem) {
-    Status status = simulation_complete(&request->simulation, limits, warnings, problem);
+    Status status = STATUS_OK;
+    if (request->study != NULL && study_kind(request->study)->prepare != NULL)
+        status = study_kind(request->study)->prepare(request->study, &request->simulation, problem);
+    status = study_first_failure(
+        status, simulation_complete(&request->simulation, limits, warnings, problem));
     if (request->study == NULL || (status != STATUS_OK && status != STATUS_INVALID))
         return status;
     const Field rows[] = {study_request_fields[1], FIELD_END};

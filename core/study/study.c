@@ -52,6 +52,50 @@ Status study_failures_add(StudyFailures *failures, int status, const char *reaso
     return text_copy(why, &failure->detail);
 }
 
+const Field study_failure_fields[] = {STUDY_FAILURE_ROWS("first_run", "the first of them, from 0")};
+const Field study_runs_fields[] = {STUDY_RUNS_ROWS(study_failure_fields)};
+
+Status study_runs_add(StudyRuns *runs, const RunRecord *run, uint64_t number) {
+    runs->runs++;
+    if (run->status == STATUS_OK) {
+        runs->steps += run->steps;
+        return STATUS_OK;
+    }
+    runs->failed++;
+    return study_failures_add(&runs->failures, (int)run->status, status_slug(run->status), number,
+                              run->why);
+}
+
+Status study_runs_warn(StudyRuns *runs) {
+    if (runs->failed == 0)
+        return STATUS_OK;
+    return warnings_add(&runs->warnings, "/study", "%llu of %llu runs failed%s; the first: %s",
+                        (unsigned long long)runs->failed, (unsigned long long)runs->runs,
+                        runs->failed == runs->runs ? ", so that nothing is known" : "",
+                        runs->failures.at[0].detail);
+}
+
+Status study_sample_cost(StudySceneMaker make, const void *of, size_t count, size_t samples,
+                         const SimulationLimits *limits, double *steps) {
+    const size_t taken = count < samples ? count : samples;
+    double sum = 0;
+    size_t made = 0;
+    for (size_t i = 0; i < taken; i++) {
+        // Midpoints of equal parts, which do not follow the period of an axis.
+        const size_t member = (size_t)((double)count * ((double)i + 0.5) / (double)taken);
+        Simulation scene = {0};
+        const Status status = make(of, member, limits, &scene);
+        if (status == STATUS_OK)
+            sum += simulation_cost(&scene).steps;
+        made += status == STATUS_OK;
+        simulation_clear(&scene);
+        if (status == STATUS_NO_MEMORY)
+            return status;
+    }
+    *steps = made > 0 ? sum / (double)made * (double)count : 0;
+    return STATUS_OK;
+}
+
 double study_run_densities(const Simulation *simulation) {
     const SpectrumRequest *psd = &simulation->output.psd;
     return psd->channels.count == 0

@@ -2,6 +2,7 @@
 #ifndef CORE_STUDY_STUDY_H
 #define CORE_STUDY_STUDY_H
 
+#include "core/base/report.h"
 #include "core/simulation/simulation.h"
 
 // The environment of a study.
@@ -49,6 +50,44 @@ typedef struct StudyFailures {
 // Counts a failure. STATUS_NO_MEMORY.
 Status study_failures_add(StudyFailures *failures, int status, const char *reason, uint64_t number,
                           const char *why);
+
+// What became of the runs of a study.
+typedef struct StudyRuns {
+    uint64_t runs, failed; // made, and those of them that failed
+    double steps;          // solver steps of the others
+    StudyFailures failures;
+    Warnings warnings; // what weakens the answer
+} StudyRuns;
+
+// Rows of a StudyFailure: the name of its number, and a doc.
+// clang-format off
+#define STUDY_FAILURE_ROWS(first_, doc_) \
+    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"), \
+    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"), \
+    {.name = first_, .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = doc_}, \
+    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"), \
+    FIELD_END
+#define STUDY_RUNS_ROWS(failure_fields_) \
+    FIELD_COUNT(StudyRuns, runs, NULL, AT_MIN(0), 0, "runs made"), \
+    FIELD_COUNT(StudyRuns, failed, NULL, AT_MIN(0), 0, "runs that failed; all numbers are of the others"), \
+    FIELD_REAL(StudyRuns, steps, NULL, ANY, 0, "solver steps of all runs"), \
+    FIELD_LIST(StudyRuns, failures, failure_fields_, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"), \
+    FIELD_LIST(StudyRuns, warnings, warning_fields, 0, PRESENCE_DEFAULT, "what weakens the answer"), \
+    FIELD_END
+// clang-format on
+extern const Field study_failure_fields[], study_runs_fields[]; // the number is "first_run", from 0
+
+// Counts a run, which may have failed. STATUS_NO_MEMORY, as of the next.
+Status study_runs_add(StudyRuns *runs, const RunRecord *run, uint64_t number);
+// Warns if runs failed.
+Status study_runs_warn(StudyRuns *runs);
+
+// Estimated solver steps of `count` members, from the scenes of a sample of them, at most
+// `samples`; those that cannot be made are left out. Each scene is cleared by simulation_clear.
+typedef Status (*StudySceneMaker)(const void *of, size_t member, const SimulationLimits *limits,
+                                  Simulation *scene);
+Status study_sample_cost(StudySceneMaker make, const void *of, size_t count, size_t samples,
+                         const SimulationLimits *limits, double *steps);
 
 // Densities that a run's spectra hold; 0 without spectra.
 double study_run_densities(const Simulation *simulation);
@@ -131,6 +170,9 @@ struct StudyKind {
     const char *document; // of a result: /v1/results/{id}/DOCUMENT; NULL: the kind's name
     // Where a request names materials and records, as it was read; NULL: nowhere.
     void (*references)(void *study, struct StudyReferences *references);
+    // Changes the scene as the study needs it, before it is completed; names are resolved. NULL:
+    // no.
+    Status (*prepare)(const void *study, Simulation *simulation, Problem *problem);
     double max_runs; // its cost may be that of so many runs at their limit; 0: ten
     // Validates what rows cannot express and completes defaults, below "/study", for a completed
     // scene.

@@ -143,21 +143,9 @@ static size_t sweep_grid_affordable(const SweepGrid *grid, size_t scenes) {
     return max > AFFORDED_MIN ? max : AFFORDED_MIN;
 }
 
-// Estimated solver steps of all points, from a sample of them.
-static double sweep_grid_steps(const SweepGrid *grid, const SimulationLimits *limits) {
-    const size_t afforded = sweep_grid_affordable(grid, COST_SCENES);
-    const size_t max = afforded < COST_SAMPLES ? afforded : COST_SAMPLES;
-    const size_t samples = grid->points < max ? grid->points : max;
-    double steps = 0;
-    for (size_t i = 0; i < samples; i++) {
-        // Midpoints of equal parts, which do not follow the period of an axis.
-        const size_t point = (size_t)((double)grid->points * ((double)i + 0.5) / (double)samples);
-        Simulation target;
-        if (sweep_grid_scene(grid, point, true, limits, &target, NULL) == STATUS_OK)
-            steps += simulation_cost(&target).steps;
-        simulation_clear(&target);
-    }
-    return samples > 0 ? steps * (double)grid->points / (double)samples : 0;
+static Status sweep_grid_make(const void *of, size_t point, const SimulationLimits *limits,
+                              Simulation *scene) {
+    return sweep_grid_scene(of, point, true, limits, scene, NULL);
 }
 
 static Status sweep_grid_check_axes(const SweepStudy *study, Problem *problem) {
@@ -365,9 +353,13 @@ static Status sweep_complete(void *request, const Simulation *simulation,
 static Status sweep_cost(const void *request, const Simulation *simulation,
                          const SimulationLimits *limits, double *steps) {
     SweepGrid *grid;
-    const Status status = sweep_grid_new(request, simulation, limits, &grid, NULL);
-    if (status == STATUS_OK)
-        *steps = sweep_grid_steps(grid, limits);
+    Status status = sweep_grid_new(request, simulation, limits, &grid, NULL);
+    if (status == STATUS_OK) {
+        const size_t afforded = sweep_grid_affordable(grid, COST_SCENES);
+        status =
+            study_sample_cost(sweep_grid_make, grid, grid->points,
+                              afforded < COST_SAMPLES ? afforded : COST_SAMPLES, limits, steps);
+    }
     sweep_grid_free(grid);
     return status;
 }

@@ -19,10 +19,10 @@ static const char *fragility_axis(Chart *chart, const FragilityIntensity *intens
 static double fragility_share(const Fragility *answer, const FragilityState *limit, size_t level) {
     size_t known = 0, exceeded = 0;
     for (size_t r = 0; r < answer->curves.count; r++) {
-        const FragilityPoints *points = &answer->curves.at[r].points;
+        const FragilityPoint *points = answer->curves.at[r].points.at;
         bool is_known = false, is_exceeded = false;
         for (size_t l = 0; l <= level; l++) {
-            const double value = points->at[l].metrics.of[limit->metric];
+            const double value = points[l].metrics.of[limit->metric];
             is_known = is_known || !isnan(value);
             is_exceeded = is_exceeded || value > limit->value;
         }
@@ -129,8 +129,8 @@ void chart_fragility(const Variant *variant, Bytes *bytes) {
     bytes_format(&chart.description,
                  "Dots: shares of the records; lines: lognormal distributions. Below: medians and "
                  "bands of 16 to 84 %% of the records. %llu of %llu runs failed.",
-                 (unsigned long long)answer->failed, (unsigned long long)answer->runs);
-    for (size_t i = 0; i < answer->warnings.count; i++)
-        chart_note(&chart, " ", answer->warnings.at[i].detail);
+                 (unsigned long long)answer->made.failed, (unsigned long long)answer->made.runs);
+    for (size_t i = 0; i < answer->made.warnings.count; i++)
+        chart_note(&chart, " ", answer->made.warnings.at[i].detail);
     chart_write(&chart, bytes);
 }

@@ -315,9 +315,10 @@ void chart_ensemble(const Variant *answer, Bytes *bytes) {
     chart.heading = has_inputs ? chart_text(&chart, "Median of %llu runs, with 90 %% of them", runs)
                                : chart_text(&chart, "Mean of %llu runs, with its %g %% interval",
                                             runs, 100 * ensemble->confidence);
-    bytes_format(&chart.description, "%llu runs of %llu, seeds from %llu; %llu failed.",
-                 (unsigned long long)ensemble->made, (unsigned long long)ensemble->runs,
-                 (unsigned long long)ensemble->first_seed, (unsigned long long)ensemble->failed);
+    bytes_format(&chart.description, "%llu runs, seeds from %llu; %llu failed.",
+                 (unsigned long long)ensemble->made.runs,
+                 (unsigned long long)ensemble->first_seed,
+                 (unsigned long long)ensemble->made.failed);
     chart_note(&chart, " Target: ", ensemble->target.why);
     bytes_format(&chart.description,
                  " %s: %g %% intervals of the mean over all seeds; boxes: half of the runs; grey "

@@ -182,7 +182,7 @@ static double steps_of(const Whole *whole, size_t count) {
 static void judge(const Whole *whole, const double *errors, double spread, const Ensemble *answer,
                   size_t at) {
     const double target = targets[at];
-    const size_t made = (size_t)answer->made;
+    const size_t made = (size_t)answer->made.runs;
     size_t lasting = whole->runs, lucky = 1, knowing = 1;
     while (lasting > 1 && errors[lasting - 2] <= target)
         lasting--;
@@ -252,8 +252,8 @@ static void scene_judge(Draws *draws) {
             if (counts[at].missed > missed)
                 printf("  missed: %s within %g, %llu of %zu runs: %.3g\n",
                        statistics_metric_names[study->metric], targets[at],
-                       (unsigned long long)((const Ensemble *)(const void *)answer)->made,
-                       whole.runs, errors[((const Ensemble *)(const void *)answer)->made - 1]);
+                       (unsigned long long)((const Ensemble *)(const void *)answer)->made.runs,
+                       whole.runs, errors[((const Ensemble *)(const void *)answer)->made.runs - 1]);
             variant_free(answer);
         }
     }

@@ -5,9 +5,9 @@ import { between, lesson, plain, sceneLink, spectrum, spread } from "./study_bit
 import { number, quantity, words } from "./units.js";
 
 export function show(host, { result: { scene, study } }) {
-  const { made, failed, failures, target, trust } = study, sure = `mean, ${number(study.confidence * 100, 2)} %`;
-  host.append(lesson(target ? `${target.is_kept ? "" : "Not kept: "}${words(target.why)}.` : `${made} runs were made.`,
-    `${trust.whole} of ${made} paths are right to their ends, ${trust.beyond} outlast what rounding lets be known.`,
+  const { runs, failed, failures, target, trust } = study, sure = `mean, ${number(study.confidence * 100, 2)} %`;
+  host.append(lesson(target ? `${target.is_kept ? "" : "Not kept: "}${words(target.why)}.` : `${runs} runs were made.`,
+    `${trust.whole} of ${runs} paths are right to their ends, ${trust.beyond} outlast what rounding lets be known.`,
     failed > 0 && `${failed} runs failed and count in nothing: ${failures[0].detail}`));
   for (const { channel, unit, mean, low, high, standard_deviation: deviation } of study.spectra) {
     const most = mean.indexOf(Math.max(...mean)), times = (power) => mean.map((m, k) => m * (1 + deviation[k] / m) ** power);
@@ -17,7 +17,7 @@ export function show(host, { result: { scene, study } }) {
       summary: `The mean is largest at ${quantity(study.frequency[most], "Hz", 3)}: ${quantity(mean[most], unit, 3)}.` });
   }
   const seeded = (seed) => study.inputs.length ? `seed ${seed}` : sceneLink(`seed ${seed}`, { ...plain(scene), excitation: { ...scene.excitation, seed } });
-  host.append(table(`Each number over ${made} runs`, [...spread("Mean", "mean"),
+  host.append(table(`Each number over ${runs} runs`, [...spread("Mean", "mean"),
     { label: `The ${sure}`, numeric: true, cell: ({ low, high, unit }) => between(low, high, unit) },
     { label: "Largest", numeric: true, cell: (one) => [quantity(one.maximum, one.unit, 3), " ", seeded(one.maximum_seed)] },
   ], Object.entries(study.statistics).map(([metric, one]) => ({ ...one, metric })).filter(({ count }) => count > 0)));

@@ -58,7 +58,7 @@ TEST(each_row_is_the_scene_with_its_seed) {
     complete(&inquiry);
     assert_int_equal(study_of(&inquiry)->first_seed, 5); // the scene's own
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->made == 5 && answer->failed == 0 && answer->table.count == 5);
+    assert_true(answer->made.runs == 5 && answer->made.failed == 0 && answer->table.count == 5);
     double steps = 0;
     for (size_t i = 0; i < 5; i++) {
         Simulation *simulation = &inquiry.simulation;
@@ -72,7 +72,7 @@ TEST(each_row_is_the_scene_with_its_seed) {
         steps += outcome->steps;
         outcome_unref(outcome);
     }
-    assert_true(answer->steps == steps);
+    assert_true(answer->made.steps == steps);
     assert_true(answer->target.why == NULL && answer->target.predicted_runs == COUNT_ABSENT);
     const RunStatistic *impacts = &answer->statistics.impacts;
     assert_true(impacts->count == 5 && impacts->low < impacts->mean);
@@ -94,8 +94,8 @@ TEST(a_target_ends_it_and_looser_ones_end_it_sooner) {
             complete(&inquiry);
             Ensemble *answer = make(&inquiry, NULL);
             const EnsembleTarget *target = &answer->target;
-            made[i] = (double)answer->made;
-            assert_true(answer->table.count == answer->made && target->metric == metric);
+            made[i] = (double)answer->made.runs;
+            assert_true(answer->table.count == answer->made.runs && target->metric == metric);
             assert_true(target->is_kept && target->estimated_error <= targets[i]);
             assert_true(target->pilot == 8 && target->predicted_runs >= 8);
             assert_true(target->confidence == 0.99 && target->error == targets[i]);
@@ -114,7 +114,7 @@ TEST(all_are_made_where_none_differs) {
     ((ExcitationRandom *)(void *)inquiry.simulation.scene.excitation)->rms = 1e-6;
     complete(&inquiry);
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->made == 30 && answer->target.is_kept &&
+    assert_true(answer->made.runs == 30 && answer->target.is_kept &&
                 answer->target.estimated_error == 0);
     assert_true(answer->statistics.impacts.mean == 0 && answer->statistics.impacts.high == 0);
     variant_free(&answer->variant);
@@ -127,11 +127,13 @@ TEST(a_seed_that_fails_is_a_row_with_its_reason) {
     Ensemble *whole = make(&inquiry, NULL);
     const SimulationLimits limits = {.impacts = (size_t)whole->statistics.impacts.median};
     Ensemble *answer = make(&inquiry, &limits);
-    assert_true(answer->made == 20 && answer->failed > 0 && answer->failed < 20);
-    assert_int_equal(answer->failures.count, 1);
-    assert_string_equal(answer->failures.at[0].reason, "limit");
-    assert_true(answer->failures.at[0].count == answer->failed);
-    assert_true(answer->statistics.rms_displacement.count == 20 - answer->failed);
+    assert_true(answer->made.runs == 20 && answer->made.failed > 0 && answer->made.failed < 20);
+    assert_int_equal(answer->made.failures.count, 1);
+    assert_string_equal(answer->made.failures.at[0].reason, "limit");
+    assert_true(answer->made.warnings.count == 1);
+    assert_non_null(strstr(answer->made.warnings.at[0].detail, "of 20 runs failed; the first"));
+    assert_true(answer->made.failures.at[0].count == answer->made.failed);
+    assert_true(answer->statistics.rms_displacement.count == 20 - answer->made.failed);
     bool is_first = true;
     for (size_t i = 0; i < 20; i++) {
         const RunRecord *row = &answer->table.at[i];
@@ -141,7 +143,7 @@ TEST(a_seed_that_fails_is_a_row_with_its_reason) {
         assert_true(isnan(row->steps) && isnan(row->summary.rms_displacement));
         assert_non_null(strstr(row->why, "impacts"));
         if (is_first)
-            assert_int_equal(answer->failures.at[0].first, row->number);
+            assert_int_equal(answer->made.failures.at[0].first, row->number);
         is_first = false;
     }
     variant_free(&answer->variant);
@@ -155,10 +157,11 @@ TEST(where_all_fail_the_study_says_so_and_nothing_else) {
     complete(&inquiry);
     const SimulationLimits limits = {.impacts = 1};
     Ensemble *answer = make(&inquiry, &limits);
-    assert_true(answer->made == 10 && answer->failed == 10 && !answer->target.is_kept);
+    assert_true(answer->made.runs == 10 && answer->made.failed == 10 && !answer->target.is_kept);
     assert_true(isnan(answer->target.estimated_error));
     assert_true(isnan(answer->statistics.rms_displacement.mean) && answer->spectra.count == 0);
     assert_non_null(strstr(answer->target.why, "none of the 10 runs"));
+    assert_non_null(strstr(answer->made.warnings.at[0].detail, "so that nothing is known"));
     variant_free(&answer->variant);
     study_request_clear(&inquiry);
 }
@@ -198,7 +201,7 @@ TEST(it_tells_its_progress_and_can_be_stopped_wherever_it_is) {
     const Progress progress = {&patience, lose};
     assert_int_equal(run(&inquiry, &progress, NULL, NULL, &answer), STATUS_OK);
     const int whole = patience.asked;
-    assert_true(whole >= (int)answer->made && patience.last > 0.5);
+    assert_true(whole >= (int)answer->made.runs && patience.last > 0.5);
     variant_free(&answer->variant);
     for (int left = 0; left < whole; left += 1 + whole / 40) {
         patience = (CpuBudget){.left = left};

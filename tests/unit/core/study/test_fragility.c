@@ -57,6 +57,8 @@ static StudyRequest request_make(size_t records) {
     StudyRequest request = {0};
     scene_without_damper(&request.simulation);
     request.simulation.scene.duration = 5;
+    variant_free(request.simulation.scene.excitation);
+    request.simulation.scene.excitation = variant_new(&excitation_free.kind);
     request.study = variant_new(&study_fragility.kind);
     assert_non_null(request.study);
     for (size_t i = 0; i < records; i++)
@@ -87,7 +89,7 @@ TEST(curves_of_a_linear_scene_are_lines_and_their_limits_are_fitted) {
     study->levels = (FragilityLevels){.from = 0.5, .to = 15, .count = 30};
     add_limit(study, "peak_displacement", 0.02);
     Fragility *answer = run(&request);
-    assert_true(answer->runs == RECORDS * 30 && answer->failed == 0 && answer->steps > 0);
+    assert_true(answer->made.runs == RECORDS * 30 && answer->made.failed == 0 && answer->made.steps > 0);
     assert_true(answer->curves.count == RECORDS && answer->intensity.measure == 0);
     CensoredNumber intervals[RECORDS];
     double at_last[RECORDS];
@@ -119,7 +121,7 @@ TEST(curves_of_a_linear_scene_are_lines_and_their_limits_are_fitted) {
     assert_true(last->level == 15 && last->count == RECORDS);
     assert_true(fabs(last->p50 / statistics_quantile(at_last, RECORDS, 0.5) - 1) < 1e-12);
     assert_true(fabs(last->p84 / statistics_quantile(at_last, RECORDS, 0.84) - 1) < 1e-12);
-    assert_true(answer->warnings.count == 0);
+    assert_true(answer->made.warnings.count == 0);
     variant_free(&answer->variant);
     study_request_clear(&request);
 }
@@ -146,10 +148,10 @@ TEST(an_intensity_of_the_scenes_own_oscillator_leaves_no_dispersion) {
         }
     static const char *const whys[] = {"do not tell the records apart", "take higher levels",
                                        "take lower levels"};
-    assert_true(answer->warnings.count == 3);
+    assert_true(answer->made.warnings.count == 3);
     for (size_t i = 0; i < 3; i++) {
         assert_true(isnan(answer->limits.at[i].median) && isnan(answer->limits.at[i].dispersion));
-        assert_non_null(strstr(answer->warnings.at[i].detail, whys[i]));
+        assert_non_null(strstr(answer->made.warnings.at[i].detail, whys[i]));
     }
     assert_true(answer->limits.at[0].exceeded == 4 && answer->limits.at[1].exceeded == 0);
     variant_free(&answer->variant);
@@ -163,14 +165,14 @@ TEST(runs_that_fail_are_counted_and_say_nothing) {
     add_limit(study, "peak_displacement", 0.02);
     request.simulation.scene.duration = 3;
     Fragility *answer = run(&request);
-    assert_true(answer->runs == 9 && answer->failed == 3 && answer->failures.count == 1);
-    assert_true(answer->failures.at[0].count == 3 && answer->failures.at[0].first == 2);
-    assert_non_null(answer->failures.at[0].detail);
+    assert_true(answer->made.runs == 9 && answer->made.failed == 3 && answer->made.failures.count == 1);
+    assert_true(answer->made.failures.at[0].count == 3 && answer->made.failures.at[0].first == 2);
+    assert_non_null(answer->made.failures.at[0].detail);
     assert_true(isnan(answer->curves.at[0].points.at[2].metrics.peak_displacement));
     assert_true(answer->fractiles.at[2].count == 0 && isnan(answer->fractiles.at[2].p50));
     // The records last 3.98 s.
-    assert_string_equal(answer->warnings.at[0].pointer, "/duration");
-    assert_non_null(strstr(answer->warnings.at[0].detail, "3 of the records (r0, r1, r2)"));
+    assert_string_equal(answer->made.warnings.at[0].pointer, "/duration");
+    assert_non_null(strstr(answer->made.warnings.at[0].detail, "3 of the records (r0, r1, r2)"));
     variant_free(&answer->variant);
     study_request_clear(&request);
 }
@@ -203,6 +205,9 @@ TEST(senseless_requests_are_refused_at_their_place) {
     study->levels.from = study->levels.to = (double)NAN;
     study->levels.count = COUNT_ABSENT;
     refuse(&request, "/study/levels/2", "must be above the one before it");
+    study->levels.values.at[0] = 0;
+    refuse(&request, "/study/levels/0", "must be above 0");
+    study->levels.values.at[0] = 1;
     study->levels.values.at[2] = 4;
     study->intensity.damping_ratio = 0.1;
     refuse(&request, "/study/intensity/damping_ratio", "needs the period");
@@ -225,6 +230,32 @@ TEST(senseless_requests_are_refused_at_their_place) {
     study->records.at[1].name = strdup("r1");
     add_record(study, 2, true);
     refuse(&request, "/study/records/2", "is a base at rest");
+    study_request_clear(&request);
+}
+
+// The records move the base of the scene's own run, too, unless it names another one.
+TEST(an_excitation_that_the_records_would_replace_is_refused) {
+    StudyRequest request = request_make(2);
+    Warnings warnings = {NULL, 0};
+    set_levels(study_of(&request), (double[]){1, 2}, 2);
+    add_limit(study_of(&request), "peak_displacement", 0.02);
+    assert_int_equal(study_request_complete(&request, NULL, &warnings, &problem), STATUS_OK);
+    for (size_t i = 0; i < warnings.count; i++)
+        assert_null(strstr(warnings.at[i].detail, "nothing moves"));
+    warnings_clear(&warnings);
+    const ExcitationRecord *record =
+        (const ExcitationRecord *)(void *)request.simulation.scene.excitation;
+    assert_string_equal(record->name, "r0");
+    assert_int_equal(complete(&request), STATUS_OK);
+    variant_free(request.simulation.scene.excitation);
+    request.simulation.scene.excitation = variant_new(&excitation_sine.kind);
+    refuse(&request, "/excitation", "is of the kind sine: leave it out");
+    study_request_clear(&request);
+    request = request_make(1);
+    Excitation *start = (Excitation *)(void *)request.simulation.scene.excitation;
+    assert_true(reals_allocate(&start->displacement, 1));
+    start->displacement.at[0] = 0.01;
+    refuse(&request, "/excitation", "give the start with the kind record");
     study_request_clear(&request);
 }
 

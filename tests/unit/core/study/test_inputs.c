@@ -100,7 +100,7 @@ TEST(numbers_have_their_distributions) {
     study_of(&inquiry)->sampling = SAMPLING_SOBOL;
     complete(&inquiry);
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->made == 1024 && answer->failed == 0 && answer->inputs.count == 4);
+    assert_true(answer->made.runs == 1024 && answer->made.failed == 0 && answer->inputs.count == 4);
     assert_string_equal(answer->inputs.at[3].pointer, "/dampers/0/mass");
     assert_string_equal(answer->inputs.at[3].unit, "kg");
     assert_moments(answer, 0, 1.35, 0.1);
@@ -118,7 +118,7 @@ TEST(values_out_of_range_are_drawn_again_and_counted) {
         study_of(&inquiry)->sampling = method;
         complete(&inquiry);
         Ensemble *answer = make(&inquiry, NULL);
-        assert_true(answer->failed == 0 && answer->inputs.at[0].drawn_again > 40);
+        assert_true(answer->made.failed == 0 && answer->inputs.at[0].drawn_again > 40);
         for (size_t i = 0; i < answer->table.count; i++)
             assert_true(answer->table.at[i].inputs.at[0] <= 1);
         variant_free(&answer->variant);
@@ -179,7 +179,7 @@ TEST(a_material_spreads_all_rows_of_a_table_by_one_factor) {
     complete(&inquiry);
     assert_true(study_of(&inquiry)->inputs.at[0].restitution_deviation == 0.2);
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->failed == 0 && answer->inputs.count == 2);
+    assert_true(answer->made.failed == 0 && answer->inputs.count == 2);
     assert_string_equal(answer->inputs.at[1].pointer, "/dampers/0/buffer/contact_time");
     assert_true(answer->inputs.at[0].is_factor && answer->inputs.at[0].drawn_again > 0);
     for (size_t i = 0; i < 40; i++) // the largest e, 0.9, stays below 1
@@ -203,7 +203,7 @@ TEST(sobol_indices_of_a_scene_with_known_variances_are_within_their_intervals) {
     study_of(&inquiry)->sobol_indices = true;
     complete(&inquiry);
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->made == 2000 && answer->failed == 0 && answer->table.count == 800);
+    assert_true(answer->made.runs == 2000 && answer->made.failed == 0 && answer->table.count == 800);
     assert_int_equal(answer->statistics.peak_acceleration.count, 800);
     const double q = exp(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
     size_t found = 0;
@@ -232,7 +232,7 @@ TEST(under_a_random_base_the_seed_is_an_input_of_the_indices) {
     study_of(&inquiry)->sobol_indices = true;
     complete(&inquiry);
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->made == 16 * 4 && answer->table.count == 32);
+    assert_true(answer->made.runs == 16 * 4 && answer->table.count == 32);
     assert_true(answer->table.at[31].number == 4 + 31);
     for (size_t i = 0; i < answer->indices.count; i++) {
         const EnsembleIndex *index = &answer->indices.at[i];
@@ -250,9 +250,9 @@ TEST(a_draw_without_a_valid_scene_is_a_failed_run) {
     add(&inquiry, "/dampers/0/position", INPUT_UNIFORM, -0.01, 0.01, 0); // stops are at 0.0075
     complete(&inquiry);
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->made == 60 && answer->failed > 5 && answer->failed < 30);
-    assert_int_equal(answer->failures.count, 1);
-    assert_true(answer->failures.at[0].count == answer->failed);
+    assert_true(answer->made.runs == 60 && answer->made.failed > 5 && answer->made.failed < 30);
+    assert_int_equal(answer->made.failures.count, 1);
+    assert_true(answer->made.failures.at[0].count == answer->made.failed);
     for (size_t i = 0; i < 60; i++) {
         const RunRecord *row = &answer->table.at[i];
         assert_true(row->inputs.count == 1);
@@ -324,7 +324,7 @@ TEST(senseless_inputs_are_refused) {
         {"/structure/mas", INPUT_UNIFORM, 1, 2, 0, "/study/inputs/0/pointer",
          "there is no \"mas\""},
         {"/duration", INPUT_UNIFORM, 1, 2, 0, "/study/inputs/0/pointer",
-         "must be below /structure"},
+         "must be a member of the structure"},
         {"/dampers/0/storey", INPUT_UNIFORM, 1, 2, 0, "/study/inputs/0/pointer", "a real number"},
         {"/dampers/0/buffer", INPUT_UNIFORM, 1, 2, 0, "/study/inputs/0/pointer", "material"},
         {"/structure/mass", INPUT_MATERIAL, NAN, NAN, 0, "/study/inputs/0/pointer",
