@@ -116,6 +116,7 @@ def test_senseless_requests_are_refused_at_their_place():
                 ({"records": ["quake_1", "quake_1"]}, "/study/records/1", "twice"),
                 ({"records": []}, "/study/records", "required"),
                 ({"levels": [1, 1]}, "/study/levels/1", "rise"),
+                ({"levels": [0, 1]}, "/study/levels/0", "above 0"),
                 ({"levels": []}, "/study/levels", "required"),
                 ({"levels": 3}, "/study/levels", "must be an object or an array of numbers"),
                 ({"levels": {"from": 0, "to": 2, "count": 3}}, "/study/levels/from", "above 0"),
@@ -128,6 +129,11 @@ def test_senseless_requests_are_refused_at_their_place():
             faults = reply.json()["errors"]
             assert reply.status == 422 and [fault["pointer"] for fault in faults] == [pointer], (members, faults)
             assert words in faults[0]["detail"] or words in faults[0].get("value", ""), (members, faults)
+        plan = daemon.request("POST", "/v1/jobs?dry_run=1", json=example(records=["quake_1", "quake_2"])).json()
+        assert plan["scene"]["excitation"]["name"] == "quake_1" and not plan["warnings"], plan["warnings"]
+        scene = {**example(records=["quake_1", "quake_2"]), "excitation": {"kind": "sine", "amplitude": 1, "frequency": 2}}
+        (fault,) = daemon.submit(scene).json()["errors"]
+        assert fault["pointer"] == "/excitation" and "would be replaced by the records" in fault["detail"], fault
         job = program.finished(daemon, example(records=["quake_1", "quake_2"], limits=[{"metric": "impacts", "value": 1e6}]))
         answer = daemon.get(f"/v1/results/{job['result']}/fragility.json").json()
         assert answer["limits"][0]["median"] is None and answer["limits"][0]["median_interval_95"] is None, answer["limits"]
