@@ -316,8 +316,7 @@ void chart_ensemble(const Variant *answer, Bytes *bytes) {
                                : chart_text(&chart, "Mean of %llu runs, with its %g %% interval",
                                             runs, 100 * ensemble->confidence);
     bytes_format(&chart.description, "%llu runs, seeds from %llu; %llu failed.",
-                 (unsigned long long)ensemble->made.runs,
-                 (unsigned long long)ensemble->first_seed,
+                 (unsigned long long)ensemble->made.runs, (unsigned long long)ensemble->first_seed,
                  (unsigned long long)ensemble->made.failed);
     chart_note(&chart, " Target: ", ensemble->target.why);
     bytes_format(&chart.description,

@@ -210,7 +210,7 @@ static void judge(const Whole *whole, const double *errors, double spread, const
     count->all += steps_of(whole, whole->runs);
     if (count->ratio_count < COUNT(count->ratios))
         count->ratios[count->ratio_count++] = ratio;
-    assert_true(fabs(answer->steps / steps_of(whole, made) - 1) < 1e-12);
+    assert_true(fabs(answer->made.steps / steps_of(whole, made) - 1) < 1e-12);
     assert_true(answer->target.is_kept && answer->target.estimated_error <= target);
 }
 

@@ -89,7 +89,8 @@ TEST(curves_of_a_linear_scene_are_lines_and_their_limits_are_fitted) {
     study->levels = (FragilityLevels){.from = 0.5, .to = 15, .count = 30};
     add_limit(study, "peak_displacement", 0.02);
     Fragility *answer = run(&request);
-    assert_true(answer->made.runs == RECORDS * 30 && answer->made.failed == 0 && answer->made.steps > 0);
+    assert_true(answer->made.runs == RECORDS * 30 && answer->made.failed == 0 &&
+                answer->made.steps > 0);
     assert_true(answer->curves.count == RECORDS && answer->intensity.measure == 0);
     CensoredNumber intervals[RECORDS];
     double at_last[RECORDS];
@@ -165,7 +166,8 @@ TEST(runs_that_fail_are_counted_and_say_nothing) {
     add_limit(study, "peak_displacement", 0.02);
     request.simulation.scene.duration = 3;
     Fragility *answer = run(&request);
-    assert_true(answer->made.runs == 9 && answer->made.failed == 3 && answer->made.failures.count == 1);
+    assert_true(answer->made.runs == 9 && answer->made.failed == 3 &&
+                answer->made.failures.count == 1);
     assert_true(answer->made.failures.at[0].count == 3 && answer->made.failures.at[0].first == 2);
     assert_non_null(answer->made.failures.at[0].detail);
     assert_true(isnan(answer->curves.at[0].points.at[2].metrics.peak_displacement));

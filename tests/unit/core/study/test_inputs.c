@@ -203,7 +203,8 @@ TEST(sobol_indices_of_a_scene_with_known_variances_are_within_their_intervals) {
     study_of(&inquiry)->sobol_indices = true;
     complete(&inquiry);
     Ensemble *answer = make(&inquiry, NULL);
-    assert_true(answer->made.runs == 2000 && answer->made.failed == 0 && answer->table.count == 800);
+    assert_true(answer->made.runs == 2000 && answer->made.failed == 0 &&
+                answer->table.count == 800);
     assert_int_equal(answer->statistics.peak_acceleration.count, 800);
     const double q = exp(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
     size_t found = 0;
