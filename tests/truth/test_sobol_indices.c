@@ -107,7 +107,7 @@ static bool try_scene(void) {
         UncertainInput *input = list_append(&study->inputs, sizeof *input);
         assert_non_null(input);
         assert_int_equal(fields_default(uncertain_input_fields, input), STATUS_OK);
-        assert_int_equal(text_copy(pointers[i], &input->pointer), STATUS_OK);
+        assert_int_equal(text_copy(pointers[i], &input->axis.pointer), STATUS_OK);
         input->distribution = INPUT_LOGNORMAL;
         input->median = medians[i];
         input->log_deviation = s[i];
