@@ -44,15 +44,20 @@ static bool polynomial_root_march(const double *c, size_t degree, double *s, boo
     double bound = 0;
     for (size_t i = 2; i <= degree; i++)
         bound -= (double)(i * (i - 1)) * polynomial_negative_part(c[i]);
+    const double near = 2 * polynomial_noise(c, degree, 1); // above all noise
     double at = 0;
     for (int step = 0; step < ROOT_STEPS; step++) {
-        const double value = polynomial_value(c, degree, at);
-        const double slope = polynomial_slope(c, degree, at);
+        // polynomial_value and polynomial_slope side by side.
+        double value = c[degree], slope = 0;
+        for (size_t i = degree; i > 0; i--) {
+            slope = slope * at + (double)i * c[i];
+            value = value * at + c[i - 1];
+        }
         if (isnan(value)) { // NAN: stop, because halving would not terminate
             *found = false;
             return true;
         }
-        if (value <= polynomial_noise(c, degree, at)) {
+        if (value <= near && value <= polynomial_noise(c, degree, at)) {
             // The rest is within rounding: one Newton step.
             const double last = slope < 0 ? -value / slope : 0;
             *s = fmin(fmax(at + last, 0), 1);

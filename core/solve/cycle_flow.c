@@ -267,10 +267,10 @@ static Status cycle_flow_make(CycleFlow *flow, const CycleFlow *from, Problem *p
     ModalState *state = &flow->engine.state;
     if (from != NULL)
         cycle_flow_carry_storeys(flow, &from->engine.state);
+    flow->engine.linearised = &flow->linearised;
     TRY(event_engine_make(&flow->engine, &flow->run, exact_tolerance(flow->run.accuracy),
                           &flow->response, problem));
     TRY(linearised_motion_make(&flow->linearised, state, problem));
-    flow->engine.linearised = &flow->linearised;
     state->is_shadow = true;
     flow->kept = calloc(2 * state->padded, sizeof *flow->kept);
     flow->kept_dampers = calloc(state->dampers + 1, sizeof *flow->kept_dampers);

@@ -120,9 +120,11 @@ static Status event_engine_apply(EventEngine *engine, const ContactEvent *event)
     return status;
 }
 
-// The longest Taylor step. A half-sine of the base is fast only while it lasts.
-static double event_engine_arc_max(const ModalState *state, const Slice *slice) {
-    return 1 / fmax(modal_state_rate(state), slice->omega);
+// The longest Taylor step. A half-sine of the base is fast only while it lasts. Longer ones, of
+// degree 26 instead of 21, take two thirds of the time where nothing else is made of the step.
+static double event_engine_arc_max(const EventEngine *engine, const Slice *slice) {
+    return (engine->linearised != NULL ? 2 : 1) /
+           fmax(modal_state_rate(&engine->state), slice->omega);
 }
 
 // One step of contact under a power law, at most `length` long.
@@ -199,7 +201,7 @@ static Status event_engine_advance(EventEngine *engine, double length) {
         return event_engine_count_steps(engine, event_engine_cost(engine, STEP_WORK_SUSTAINED));
     const bool is_suppressed = event_engine_is_suppressed(state);
     const double max = fmin(fmin(length, knot), is_suppressed ? state->suppress_time : INFINITY);
-    taylor_step_make(arc, state, &slice, fmin(max, event_engine_arc_max(state, &slice)));
+    taylor_step_make(arc, state, &slice, fmin(max, event_engine_arc_max(engine, &slice)));
     state->run->work.arcs++;
     ContactEvent event;
     const bool is_event = contact_event_find(state, arc, &event) &&
@@ -289,7 +291,7 @@ Status event_engine_settle(EventEngine *engine) {
         ContactEvent event;
         (void)base_cursor_slice(&state->base, 0, 0, &slice);
         taylor_step_make(&engine->arc, state, &slice,
-                         fmin(state->interval, event_engine_arc_max(state, &slice)));
+                         fmin(state->interval, event_engine_arc_max(engine, &slice)));
         is_event = contact_event_find(state, &engine->arc, &event) && event.s == 0 &&
                    state->damper[event.damper].phase == PHASE_FLIGHT;
         if (is_event)
@@ -347,8 +349,10 @@ Status event_engine_make(EventEngine *engine, Run *run, double tolerance, Respon
     ModalState *state = &engine->state;
     TRY(modal_state_make(state, run, problem));
     TRY(taylor_step_allocate(&engine->arc, state, problem));
-    TRY(flight_make(&engine->flight, state, problem));
-    TRY(sustained_contact_make(&engine->sustained, state, problem));
+    if (engine->linearised == NULL) { // whose steps have no use for these tables
+        TRY(flight_make(&engine->flight, state, problem));
+        TRY(sustained_contact_make(&engine->sustained, state, problem));
+    }
     TRY(power_contact_make(&engine->power, state, tolerance, problem));
     TRY(recorder_start(&engine->record, state, response, problem));
     const EnergyState energy = modal_state_energy(state);
