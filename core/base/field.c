@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+const char *const field_flags[] = {"false", "true", NULL};
+
 static void *field_member(const Field *field, const void *item) {
     return (char *)item + field->offset;
 }

@@ -30,6 +30,7 @@ typedef enum FieldKind {
 
 #define COUNT_ABSENT UINT64_MAX
 #define CHOICE_ABSENT (-1)
+extern const char *const field_flags[]; // of FIELD_FLAG_OR_NULL
 
 // Containers own their elements. Typed lists (struct { Damper *at; size_t count; }) have the layout
 // of List, which FIELD_LIST checks.
@@ -130,6 +131,7 @@ enum {
     // TEXTS: an allowed text may end with a number from 1: "displacement_2".
     FIELD_NUMBERED = 16,
     // TEXT, TEXTS: it, or each, is a JSON number, string, true or false, stored as JSON text.
+    // CHOICE: the choices are false and true.
     FIELD_SCALARS = 32,
     // Internal: copied and cleared with the struct, but not read, written, described, validated or
     // found by name, and not part of the canonical form. Its presence is OPTIONAL.
@@ -201,6 +203,10 @@ struct Field {
 #define FIELD_CHOICE(Type, member, choices_, default_, doc_) \
     {.name = #member, .kind = FIELD_KIND_CHOICE, .offset = FIELD_AT(Type, member, int), \
      .choices = choices_, .presence = FIELD_PRESENCE(default_), .initial = (default_), .doc = doc_}
+// False, true or, where it is unknown, CHOICE_ABSENT: an int, so that it has a third value.
+#define FIELD_FLAG_OR_NULL(Type, member, doc_) \
+    {.name = #member, .kind = FIELD_KIND_CHOICE, .offset = FIELD_AT(Type, member, int), .choices = field_flags, \
+     .presence = PRESENCE_OPTIONAL, .initial = OPTIONAL, .flags = FIELD_SCALARS, .doc = doc_}
 #define FIELD_REALS(Type, member, unit_, range_, max_, presence_, doc_) \
     {.name = #member, .kind = FIELD_KIND_REALS, .offset = FIELD_AT(Type, member, Reals), .unit = unit_, \
      .size = sizeof(double), .range = range_, .max = max_, .presence = presence_, .doc = doc_}

@@ -55,7 +55,7 @@ const Field response_point_fields[] = {
     FIELD_CHOICE(ResponsePoint, direction, curve_direction_names, OPTIONAL, "in which the axis was followed; absent in a continuation"),
     FIELD_COUNT(ResponsePoint, period, NULL, AT_MIN(1), OPTIONAL, "in cycles of the sine; null: no periodic orbit found"),
     FIELD_COUNT(ResponsePoint, impacts_per_period, NULL, AT_MIN(0), OPTIONAL, "of all dampers"),
-    FIELD_FLAG(ResponsePoint, stable, false, "all multipliers are below 1 in magnitude; false also where one is 1, as of a mass that touches no stop"),
+    FIELD_FLAG_OR_NULL(ResponsePoint, stable, "all multipliers are below 1 in magnitude; false also where one is 1, as of a mass that touches no stop; null where no period is found"),
     FIELD_ROWS_OR_NULL(ResponsePoint, multipliers, NULL, "Floquet multipliers, real and imaginary part, the largest first"),
     FIELD_REAL(ResponsePoint, peak_displacement, "m", ANY, OPTIONAL, "largest displacement of any storey over the period or the section's cycles, also between events"),
     FIELD_REAL(ResponsePoint, rms_displacement, "m", ANY, OPTIONAL, "root mean square over the same time, the largest of all storeys"),
@@ -207,13 +207,17 @@ static size_t curve_wander_cycles(const ResponseStudy *study) {
                                                     : CURVE_WANDER_MIN;
 }
 
-// As if no point had a period, and with the columns of the linearised motion.
+// As if no point had a period, and with the columns of the linearised motion; by the exact solver.
 static Status curve_cost(const void *request, const Simulation *simulation,
                          const SimulationLimits *limits, double *steps) {
     const ResponseStudy *study = request;
     const bool varies_frequency =
         study->axis.pointer != NULL && strcmp(study->axis.pointer, "/excitation/frequency") == 0;
-    const double second = simulation_cost(simulation).steps / simulation->scene.duration;
+    const uint64_t modes = ((const Accuracy *)(const void *)simulation->accuracy)->modes;
+    AccuracyExact exact = {{{&solver_exact.kind}, modes}, (double)NAN};
+    Simulation view = *simulation; // borrows all but the solver
+    view.accuracy = &exact.accuracy.variant;
+    const double second = simulation_cost(&view).steps / simulation->scene.duration;
     // Mean length of a cycle over the points.
     double period = 0;
     for (size_t i = 0; i < study->axis.count; i++) {
@@ -281,7 +285,7 @@ static Status curve_fill_orbit(CurveWork *work, CycleFlow *flow, size_t period,
     const double radius = orbit_search_radius(search);
     point->period = period;
     point->impacts_per_period = motion.impacts;
-    point->stable = radius < 1 - CURVE_MARGIN;
+    point->stable = isnan(radius) ? CHOICE_ABSENT : radius < 1 - CURVE_MARGIN;
     for (size_t i = 0; i < search->size && !isnan(radius); i++)
         TRY(curve_add_row(search->real[i], search->imaginary[i], &point->multipliers));
     point->peak_displacement = motion.peak_displacement;

@@ -34,7 +34,7 @@ typedef struct ResponsePoint {
     int direction;   // CurveDirection; CHOICE_ABSENT: of a continuation
     uint64_t period; // cycles; COUNT_ABSENT: no periodic orbit found
     uint64_t impacts_per_period;
-    bool stable;
+    int stable; // 0, 1 or CHOICE_ABSENT
     Rows multipliers; // real and imaginary part of each
     double peak_displacement, rms_displacement, undamped_peak_displacement; // [m]
     Rows section;    // displacement and velocity

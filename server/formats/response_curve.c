@@ -118,7 +118,8 @@ void response_curve_table(const Variant *answer, StudyTable *table) {
         study_table_number(table, "value", curve->unit, point->value);
         study_table_text(table, "direction", response_direction(point->direction));
         study_table_number(table, "period", NULL, is_periodic ? (double)point->period : unknown);
-        study_table_number(table, "stable", NULL, is_periodic ? (double)point->stable : unknown);
+        study_table_number(table, "stable", NULL,
+                           point->stable != CHOICE_ABSENT ? (double)point->stable : unknown);
         study_table_number(table, "impacts_per_period", NULL,
                            is_periodic ? (double)point->impacts_per_period : unknown);
         study_table_number(table, "largest_multiplier", NULL,

@@ -62,7 +62,8 @@ static void encode_put_value(Bytes *bytes, const Field *field, const void *membe
                    *(char *const *)member);
         break;
     case FIELD_KIND_CHOICE:
-        bytes_json_string(bytes, field->choices[*(const int *)member]);
+        bytes_json(bytes, (field->flags & FIELD_SCALARS) != 0 ? "%p" : "%s",
+                   field->choices[*(const int *)member]);
         break;
     case FIELD_KIND_REALS: {
         const Reals *reals = member;

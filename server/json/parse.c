@@ -240,8 +240,13 @@ static void decode_text(Decoder *decoder, const json_t *value, const Field *fiel
 
 static void decode_choice(Decoder *decoder, const json_t *value, const Field *field, void *target,
                           const char *pointer) {
-    if (!json_is_string(value)) {
-        decode_wrong_type(decoder, pointer, value, field, "a string");
+    const bool is_flag = (field->flags & FIELD_SCALARS) != 0;
+    if (is_flag && json_is_boolean(value)) {
+        *(int *)target = json_is_true(value);
+        return;
+    }
+    if (is_flag || !json_is_string(value)) {
+        decode_wrong_type(decoder, pointer, value, field, is_flag ? "true or false" : "a string");
         return;
     }
     for (int i = 0; field->choices[i] != NULL; i++) {

@@ -210,7 +210,10 @@ static void schema_value(Bytes *bytes, SchemaUse use, const Field *field) {
             bytes_format(bytes, ",\"maxLength\":%zu", field->max);
         break;
     case FIELD_KIND_CHOICE:
-        schema_texts(bytes, "enum", field->choices);
+        if ((field->flags & FIELD_SCALARS) != 0)
+            bytes_text(bytes, ",\"type\":\"boolean\"");
+        else
+            schema_texts(bytes, "enum", field->choices);
         if (has_default)
             schema_text(bytes, "default", field->choices[(int)field->initial]);
         break;

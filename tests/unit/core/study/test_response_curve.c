@@ -68,11 +68,12 @@ TEST(a_curve_has_orbits_with_their_stability_and_sections_between) {
         if (point->period != COUNT_ABSENT) {
             periodic++;
             assert_int_equal(point->multipliers.count, 4);
-            assert_true(point->stable && isnan(point->lyapunov) && point->section.count == 0);
+            assert_true(point->stable == 1 && isnan(point->lyapunov) && point->section.count == 0);
         } else {
             aperiodic++;
             assert_int_equal(point->section.count, 64);
             assert_true(point->multipliers.count == 0 && isfinite(point->lyapunov));
+            assert_int_equal(point->stable, CHOICE_ABSENT);
         }
     }
     assert_true(periodic >= 10 && aperiodic >= 3);
@@ -89,7 +90,7 @@ TEST(up_and_down_part_where_two_motions_are_stable) {
     for (size_t i = 0; i < 15; i++) {
         const ResponsePoint *up = &curve->points.at[i], *down = &curve->points.at[29 - i];
         assert_true(up->value == down->value && down->direction == CURVE_DOWN);
-        parted += up->stable && down->stable &&
+        parted += up->stable == 1 && down->stable == 1 &&
                   fabs(up->peak_displacement / down->peak_displacement - 1) > 1e-3;
     }
     assert_true(parted > 0);
@@ -106,7 +107,7 @@ TEST(a_continuation_follows_a_branch_through_a_fold) {
         const ResponsePoint *point = &curve->points.at[i];
         assert_true(point->direction == CHOICE_ABSENT && point->period != COUNT_ABSENT);
         const double *first = point->multipliers.at[0].at;
-        unstable += !point->stable && hypot(first[0], first[1]) > 1;
+        unstable += point->stable == 0 && hypot(first[0], first[1]) > 1;
         folds += i >= 22 && point[-1].branch == point->branch &&
                  point[-2].branch == point->branch &&
                  (point->value - point[-1].value) * (point[-1].value - point[-2].value) < 0;
@@ -126,6 +127,7 @@ TEST(a_point_that_fails_is_counted_with_its_reason) {
     assert_string_equal(curve->failures.at[0].reason, "invalid");
     assert_int_equal(curve->failures.at[0].count, 2);
     assert_true(isnan(curve->points.at[0].peak_displacement));
+    assert_int_equal(curve->points.at[0].stable, CHOICE_ABSENT);
     assert_true(curve->points.at[4].peak_displacement > 0);
     variant_free(&curve->variant);
 }
@@ -148,6 +150,22 @@ TEST(a_study_that_has_no_cycles_or_no_number_to_vary_is_refused) {
     axis_set(&request, "/excitation/frequency", 4, 5, 10000);
     study_of(&request)->section_points = 4096;
     assert_refused(&request, "/study/section_points");
+}
+
+TEST(the_cost_does_not_depend_on_the_solver) {
+    double steps[2];
+    for (int i = 0; i < 2; i++) {
+        StudyRequest request = request_make(4);
+        Cost cost;
+        axis_set(&request, "/excitation/frequency", 4, 5, 20);
+        if (i == 1)
+            scene_choose(&request.simulation.accuracy, &solver_kinds, "adaptive");
+        assert_int_equal(study_request_complete(&request, NULL, NULL, &problem), STATUS_OK);
+        assert_int_equal(study_request_cost(&request, NULL, &cost, NULL), STATUS_OK);
+        steps[i] = cost.steps;
+        study_request_clear(&request);
+    }
+    assert_true(fabs(steps[1] / steps[0] - 1) < 0.1);
 }
 
 static bool stop_later(void *context, double fraction) {

@@ -91,6 +91,30 @@ TEST(reports_write_null_for_what_is_absent) {
     fields_clear(whole_fields, &whole);
 }
 
+TEST(a_fact_that_may_be_unknown_has_three_values) {
+    typedef struct Fact {
+        int holds;
+    } Fact;
+    static const Field fields[] = {FIELD_FLAG_OR_NULL(Fact, holds, "a fact"), FIELD_END};
+    static const char *const texts[] = {"{\"holds\": null}", "{\"holds\": false}",
+                                        "{\"holds\": true}"};
+    for (int i = 0; i < 3; i++) {
+        Problem problem = {0};
+        Fact fact;
+        Bytes text = {0};
+        const char *text_in = i == 0 ? "{}" : texts[i];
+        assert_int_equal(json_parse(text_in, strlen(text_in), fields, &fact, &problem), STATUS_OK);
+        assert_int_equal(fact.holds, i == 0 ? CHOICE_ABSENT : i - 1);
+        encode_item(&text, fields, &fact, WRITE_REPORT);
+        assert_string_equal(text.at, texts[i]);
+        bytes_clear(&text);
+    }
+    Problem problem = {0};
+    Fact fact;
+    static const char wrong[] = "{\"holds\": \"true\"}";
+    assert_int_equal(json_parse(wrong, strlen(wrong), fields, &fact, &problem), STATUS_INVALID);
+}
+
 TEST(members_stand_beside_others) {
     Round round = {{&shape_round}, {0.5}, 2};
     Bytes text = {0};
