@@ -1,5 +1,6 @@
 #include "core/math/linear_system.h"
 
+#include <lapacke.h>
 #include <math.h>
 
 static void linear_system_swap(double *a, double *b, size_t count) {
@@ -39,4 +40,31 @@ bool linear_system_solve(double *A, double *B, size_t n, size_t columns) {
             row[j] /= A[i * n + i];
     }
     return true;
+}
+
+static bool linear_system_is_before(const double *real, const double *imaginary, size_t i,
+                                    size_t j) {
+    const double a = hypot(real[i], imaginary[i]), b = hypot(real[j], imaginary[j]);
+    if (a != b)
+        return a > b;
+    return real[i] != real[j] ? real[i] > real[j] : imaginary[i] > imaginary[j];
+}
+
+Status linear_system_eigenvalues(size_t n, double *A, double *real, double *imaginary) {
+    for (size_t i = 0; i < n * n; i++)
+        if (!isfinite(A[i]))
+            return STATUS_INVALID;
+    const lapack_int size = (lapack_int)n;
+    const lapack_int found = LAPACKE_dgeev(LAPACK_ROW_MAJOR, 'N', 'N', size, A, size, real,
+                                           imaginary, NULL, size, NULL, size);
+    if (found == LAPACK_WORK_MEMORY_ERROR || found == LAPACK_TRANSPOSE_MEMORY_ERROR)
+        return STATUS_NO_MEMORY;
+    if (found != 0)
+        return STATUS_INVALID;
+    for (size_t i = 1; i < n; i++)
+        for (size_t j = i; j > 0 && linear_system_is_before(real, imaginary, j, j - 1); j--) {
+            linear_system_swap(&real[j], &real[j - 1], 1);
+            linear_system_swap(&imaginary[j], &imaginary[j - 1], 1);
+        }
+    return STATUS_OK;
 }

@@ -10,7 +10,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/math/eigenvalues.h"
 #include "core/math/linear_system.h"
 #include "core/solve/simd_kernels.h"
 
@@ -111,7 +110,7 @@ double orbit_search_map(OrbitSearch *search, CycleFlow *flow, size_t period, boo
 Status orbit_search_multiply(OrbitSearch *search) {
     memcpy(search->left, search->matrix, search->size * search->size * sizeof *search->left);
     const Status status =
-        eigenvalues_find(search->size, search->left, search->real, search->imaginary);
+        linear_system_eigenvalues(search->size, search->left, search->real, search->imaginary);
     if (status == STATUS_INVALID)
         search->real[0] = (double)NAN;
     return status == STATUS_NO_MEMORY ? status : STATUS_OK;
