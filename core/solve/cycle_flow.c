@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/math/linear_system.h"
-#include "core/solve/linearised_motion.h"
+#include "core/solve/engine.h"
 
 enum { PARTS = 16 }; // of a cycle, at which the section may be
 

@@ -381,6 +381,43 @@ void recorder_acceleration(ModalState *state);
 // Updates forces, peaks and the energy balance.
 void recorder_update(ModalState *state);
 
+// --- linearised_motion.c: beside a run, the course of small changes of its state through steps and
+// events; and peaks and squares of the displacement between events.
+
+// All zero follows nothing.
+typedef struct LinearisedMotion {
+    size_t size;     // of a column: (q, p, r, w), modes and dampers
+    size_t count;    // columns in progress
+    double *columns; // borrowed, one after the other
+    double *late;    // of each column: delay of the last event [s]; `size` of them
+    bool is_measured;
+    double peak;     // largest displacement of any storey so far [m]
+    double *squares; // of each storey, integral of the square of its displacement [m^2 s]
+
+    double *before, *after;       // derivatives of the state on the two sides of an event
+    ContactPhase *phases;         // of the dampers before it
+    double *q, *p, *r, *w, *work; // the run's own state meanwhile, and scratch
+    double base_acceleration;
+    TaylorStep arc;
+    double *block;
+} LinearisedMotion;
+
+// Freed by linearised_motion_clear, also after a failure.
+Status linearised_motion_make(LinearisedMotion *motion, const ModalState *state, Problem *problem);
+void linearised_motion_clear(LinearisedMotion *motion);
+
+// The run is at the start of a Taylor step that it makes as a whole.
+void linearised_motion_step(LinearisedMotion *motion, ModalState *state, const TaylorStep *arc);
+// Before and after a step of contact under a power law, which is only measured.
+void linearised_motion_begin_step(LinearisedMotion *motion, const ModalState *state);
+void linearised_motion_end_step(LinearisedMotion *motion, const ModalState *state, double length);
+
+// Before and after an event is applied.
+void linearised_motion_begin_event(LinearisedMotion *motion, ModalState *state,
+                                   const ContactEvent *event);
+void linearised_motion_end_event(LinearisedMotion *motion, ModalState *state,
+                                 const ContactEvent *event);
+
 // --- event_engine.c: from sample to sample.
 
 // All zero is empty.
@@ -391,10 +428,10 @@ typedef struct EventEngine {
     SustainedContact sustained;
     PowerContact power;
     Recorder record;
-    double work;                         // solver steps since the last check
-    size_t idle;                         // steps of contact in a row without time passing
-    struct RoundingGrowth *growth;       // of a single mass, or NULL
-    struct LinearisedMotion *linearised; // beside a run by Taylor steps alone, or NULL
+    double work;                   // solver steps since the last check
+    size_t idle;                   // steps of contact in a row without time passing
+    struct RoundingGrowth *growth; // of a single mass, or NULL
+    LinearisedMotion *linearised;  // beside a run by Taylor steps alone, or NULL
     double *track; // of the last FLIGHT_BUFFER_MAX samples, all modes: sample k at (k - 1) %
                    // FLIGHT_BUFFER_MAX; NULL: not wanted
 } EventEngine;

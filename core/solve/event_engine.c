@@ -10,7 +10,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/solve/linearised_motion.h"
 #include "core/solve/rounding_growth.h"
 
 enum { STORM_EVENTS = 100, IDLE_STEPS = 1000 };

@@ -10,7 +10,7 @@
 // (saltation: Aizerman and Gantmakher 1958; Leine and Nijmeijer 2004, section 7). R is linear: the
 // same stops press as in the event itself. Not followed: contact parameters that depend on the
 // approach speed.
-#include "core/solve/linearised_motion.h"
+#include "core/solve/engine.h"
 
 #include <stdlib.h>
 #include <string.h>
