@@ -4,9 +4,27 @@
 #define CORE_STUDY_CALIBRATE_H
 
 #include "core/study/axis.h"
-#include "core/study/measured_motion.h"
 
 enum { CALIBRATE_PARAMETERS = 12, CALIBRATE_STARTS = 64 };
+enum { MEASURED_CHANNELS = 16, MEASURED_SAMPLES = 1 << 17 };
+
+// Sample i is at start + i interval.
+typedef struct MeasuredChannel {
+    char *channel;
+    Reals samples;
+    double interval, start; // [s]
+    double deviation;       // standard deviation of the noise; NAN: unknown
+} MeasuredChannel;
+
+typedef struct MeasuredChannels {
+    MeasuredChannel *at;
+    size_t count;
+} MeasuredChannels;
+
+static inline double measured_time(const MeasuredChannel *measured, size_t sample) {
+    return measured->start + (double)sample * measured->interval;
+}
+double measured_rms(const MeasuredChannel *measured); // about the mean
 
 typedef enum CalibrateFit { CALIBRATE_TIME, CALIBRATE_PSD } CalibrateFit;
 extern const char *const calibrate_fit_names[];

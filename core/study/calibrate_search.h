@@ -1,6 +1,6 @@
-// The state of a calibration, which its search (calibrate_search.c) and its report share.
-#ifndef CORE_STUDY_CALIBRATE_INTERNAL_H
-#define CORE_STUDY_CALIBRATE_INTERNAL_H
+// The search of a calibration, and its state, of which the answer is made.
+#ifndef CORE_STUDY_CALIBRATE_SEARCH_H
+#define CORE_STUDY_CALIBRATE_SEARCH_H
 
 #include <math.h>
 
@@ -15,6 +15,29 @@ enum {
 };
 
 static const double calibrate_quantile_95 = 1.645, calibrate_quantile_999 = 3.09; // one-sided
+
+// The part of a measured channel that is compared. The measured channel is borrowed.
+typedef struct MeasuredTarget {
+    const MeasuredChannel *measured;
+    size_t first, samples; // the samples in it
+    bool is_spectrum;
+    WelchSettings welch; // of a spectrum
+    double floor;        // density of the noise, of both spectra
+    Reals values;     // compared: samples, or logarithms of densities from the second frequency on
+    double deviation; // of each
+    size_t place;     // of the first value among those of all channels
+} MeasuredTarget;
+
+// Samples from `from` to `to` [s], both included; `psd`: as a spectrum with these settings, NULL:
+// in time. Cleared by measured_target_clear in any case.
+Status measured_target_make(const MeasuredChannel *measured, double from, double to,
+                            const SpectrumRequest *psd, MeasuredTarget *target, Problem *problem);
+void measured_target_clear(MeasuredTarget *target);
+
+// The values of a run at the measured times moved by `shift` to later times [s]; `slopes`, unless
+// NULL, gets their derivatives by it. `cache` may be NULL.
+Status measured_target_model(const MeasuredTarget *target, const Response *response, double shift,
+                             FftCache *cache, double *values, double *slopes, Problem *problem);
 
 typedef enum StartState {
     START_EVALUATE, // its residuals are wanted
@@ -183,8 +206,5 @@ Status calibrate_search_begin(CalibrateWork *work);
 // Folds a run of the batch; after its last one the next batch is listed.
 Status calibrate_search_fold(CalibrateWork *work, size_t member, CalibratePart *part);
 void calibrate_search_free(CalibrateWork *work);
-
-// Completes the answer from the best start.
-Status calibrate_report(CalibrateWork *work);
 
 #endif
