@@ -19,11 +19,6 @@ typedef struct NormalEquations {
 void normal_equations_make(const double *const *columns, size_t count, const double *residual,
                            size_t rows, NormalEquations *equations);
 
-// The damped step from `at` to `to`, within the bounds. Returns the decrease of the sum of squares
-// that the linear model predicts; 0: no step.
-double least_squares_step(const NormalEquations *equations, double damping, const double *at,
-                          double *to);
-
 // The inverse of J' J: covariance of the variables for residuals of unit variance. Directions that
 // do not change the residuals have variances that are huge, not infinite; that of a variable
 // without any effect is INFINITY and its covariances are 0.
@@ -32,5 +27,24 @@ void least_squares_covariance(const NormalEquations *equations, double *covarian
 // The step whose covariance is the inverse of J' J, from independent standard normal numbers.
 // Directions that do not change the residuals get steps of about 1e6.
 void least_squares_draw(const NormalEquations *equations, const double *normal, double *step);
+
+// A search: the caller makes the equations of a point, asks for a step and reports its cost.
+typedef struct LeastSquares {
+    double at[LEAST_SQUARES_VARIABLES], cost; // the best point and its sum of squares
+    NormalEquations equations;                // of this point
+    double trial[LEAST_SQUARES_VARIABLES];    // the step
+    double predicted;                         // decrease of the cost that the linear model predicts
+    double damping, growth;
+} LeastSquares;
+
+// Begins at a point whose `at` and `cost` are set.
+void least_squares_begin(LeastSquares *search);
+
+// Sets the damped step, within the bounds. False: none would decrease the cost by more than
+// `tolerance`.
+bool least_squares_step(LeastSquares *search, double tolerance);
+
+// Moves to the step if its cost is less, and adapts the damping. False: it is not.
+bool least_squares_move(LeastSquares *search, double cost);
 
 #endif

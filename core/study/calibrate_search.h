@@ -10,8 +10,7 @@
 enum {
     CALIBRATE_VARIABLES = CALIBRATE_PARAMETERS + 1, // and the shift
     CALIBRATE_WINDOWS = 16, // of the record, each longer than the one before
-    CALIBRATE_SAMPLES_MIN = 16,
-    CALIBRATE_KEPT = 3, // starts of the result of a window
+    CALIBRATE_KEPT = 3,     // starts of the result of a window
 };
 
 static const double calibrate_quantile_95 = 1.645, calibrate_quantile_999 = 3.09; // one-sided
@@ -28,36 +27,21 @@ typedef struct MeasuredTarget {
     size_t place;     // of the first value among those of all channels
 } MeasuredTarget;
 
-// Samples from `from` to `to` [s], both included; `psd`: as a spectrum with these settings, NULL:
-// in time. Cleared by measured_target_clear in any case.
-Status measured_target_make(const MeasuredChannel *measured, double from, double to,
-                            const SpectrumRequest *psd, MeasuredTarget *target, Problem *problem);
-void measured_target_clear(MeasuredTarget *target);
-
-// The values of a run at the measured times moved by `shift` to later times [s]; `slopes`, unless
-// NULL, gets their derivatives by it. `cache` may be NULL.
-Status measured_target_model(const MeasuredTarget *target, const Response *response, double shift,
-                             FftCache *cache, double *values, double *slopes, Problem *problem);
-
 typedef enum StartState {
     START_EVALUATE, // its residuals are wanted
     START_DERIVE,   // its derivatives
     START_TRY,      // a step
-    START_DONE,
-    START_DROPPED
+    START_DONE
 } StartState;
 
 typedef struct CalibrateStart {
     StartState state;
     size_t number;
-    double at[CALIBRATE_VARIABLES], trial[CALIBRATE_VARIABLES];
-    double before[CALIBRATE_VARIABLES]; // at the beginning of the window
-    double cost, damping, growth, predicted;
+    LeastSquares fit;
     double differences[CALIBRATE_VARIABLES]; // by which derivatives are taken
-    NormalEquations equations;
-    double *residual, *slope; // weighted; by the shift in its unit range
+    double *residual;                        // weighted; NULL: only the cost is known
     size_t steps;
-    double horizon, error; // of its run: trust horizon [s] and estimated error
+    double horizon; // of its run: trust horizon [s]
 } CalibrateStart;
 
 // A run of the batch.
@@ -86,8 +70,6 @@ typedef enum Undetermined {
 typedef struct CalibrateAssessment {
     double covariance[CALIBRATE_VARIABLES * CALIBRATE_VARIABLES]; // of residuals of unit variance
     double errors[CALIBRATE_VARIABLES];                           // standard errors, of the range
-    double variance;                                              // of the residuals
-    double t; // half width of an interval over its standard error
     Undetermined reasons[CALIBRATE_VARIABLES];
     double low[CALIBRATE_VARIABLES], high[CALIBRATE_VARIABLES]; // ends of the intervals
     double rivals[CALIBRATE_VARIABLES];
@@ -110,7 +92,6 @@ typedef struct CalibrateResult {
     NormalEquations equations; // of the best point
     double variance, starts[CALIBRATE_KEPT][CALIBRATE_VARIABLES];
     size_t start_count, rows;
-    bool is_worse; // than the window before
 } CalibrateResult;
 
 typedef struct CalibrateWork {
@@ -121,27 +102,22 @@ typedef struct CalibrateWork {
     CalibrateStage stage;
     int fit; // CalibrateFit
     double ends[CALIBRATE_WINDOWS];
-    size_t all_windows, windows, window, repeats;
-    bool is_limited; // the record is longer than can be predicted
-    bool is_settled; // between the last two windows
-    bool is_final;   // no other window is tried
+    size_t windows, window, repeats, explorations;
+    double limit;    // end of the part that can be fitted [s]; 0: of the record
     bool is_beyond;  // because of its trust horizon
-    bool is_chaotic; // and spectra are fitted therefore
-    double horizon;  // where the fit ends then [s]
+    bool is_chaotic; // spectra are fitted, and the motion cannot be predicted to its end
+    bool is_over;
     Simulation base; // of the window
     MeasuredTarget *targets;
     double *deviations; // given or estimated, of each channel
     size_t rows;
-    CalibrateStart *starts;
+    CalibrateStart *starts; // sorted by their cost after each stage
     size_t start_count;
     CalibrateRun *runs; // the batch
     size_t run_count, first;
     double *columns[CALIBRATE_VARIABLES]; // of the start whose derivatives are folded
-    double norms[CALIBRATE_VARIABLES];    // their squares
-    size_t refinements;
     uint64_t draws;
-    size_t explorations, retries;
-    CalibrateResult results[CALIBRATE_WINDOWS + 1];
+    CalibrateResult results[CALIBRATE_WINDOWS];
     CalibratePoints points; // of the window
     CalibrateAssessment assessment;
 } CalibrateWork;
@@ -149,16 +125,15 @@ typedef struct CalibrateWork {
 typedef struct CalibratePart {
     StudyPart part;
     const CalibrateRun *run;
-    double *residual, *slope;
+    double *residual;
 } CalibratePart;
 
-static inline bool calibrate_has_shift(const CalibrateWork *work) {
-    return work->variables > work->parameters;
+static inline double calibrate_shift(const CalibrateWork *work, const double *at) {
+    return work->variables > work->parameters
+               ? (2 * at[work->parameters] - 1) * work->study->max_shift
+               : 0;
 }
 
-static inline double calibrate_shift(const CalibrateWork *work, const double *at) {
-    return calibrate_has_shift(work) ? (2 * at[work->parameters] - 1) * work->study->max_shift : 0;
-}
 static inline double calibrate_sum_squares(const double *values, size_t count) {
     double sum = 0;
     for (size_t i = 0; i < count; i++)
@@ -176,35 +151,26 @@ static inline bool calibrate_is_logarithmic(const StudyAxis *axis) {
     return axis->from > 0 && axis->to / axis->from >= 100;
 }
 
+// The value at u, which lies in [0, 1] but for the ends of intervals.
 static inline double calibrate_value(const StudyAxis *axis, double u) {
-    if (u <= 0 || u >= 1)
-        return u <= 0 ? axis->from : axis->to;
+    if (u == 0 || u == 1)
+        return u == 0 ? axis->from : axis->to;
     return calibrate_is_logarithmic(axis) ? axis->from * pow(axis->to / axis->from, u)
                                           : axis->from + u * (axis->to - axis->from);
 }
 
-// The same beyond the range, for the ends of intervals.
-static inline double calibrate_value_beyond(const StudyAxis *axis, double u) {
-    return calibrate_is_logarithmic(axis) ? axis->from * pow(axis->to / axis->from, u)
-                                          : axis->from + u * (axis->to - axis->from);
-}
+// The scene of the runs that end at `end` [s], with these measured channels alone.
+Status calibrate_make_base(const MeasuredChannels *measured, const Simulation *simulation,
+                           double end, Simulation *base);
 
-static inline double calibrate_derivative(const StudyAxis *axis, double u) {
-    return calibrate_is_logarithmic(axis) ? calibrate_value(axis, u) * log(axis->to / axis->from)
-                                          : axis->to - axis->from;
-}
-
-// The scene of the runs that end at `end` [s], with the measured channels alone.
-Status calibrate_make_base(const CalibrateStudy *study, const Simulation *simulation, double end,
-                           Simulation *base);
-
-// The best start that is not dropped; NULL: none.
-CalibrateStart *calibrate_best(const CalibrateWork *work);
-
-// Begins the search: allocates its state and lists the first runs. STATUS_NO_MEMORY.
-Status calibrate_search_begin(CalibrateWork *work);
-// Folds a run of the batch; after its last one the next batch is listed.
-Status calibrate_search_fold(CalibrateWork *work, size_t member, CalibratePart *part);
-void calibrate_search_free(CalibrateWork *work);
+// The functions of the StudyKind of these names.
+Status calibrate_begin(void *work, const StudyTools *tools, Problem *problem);
+Status calibrate_scene(const void *work, size_t member, Simulation *scene, StudyPart *part,
+                       Problem *problem);
+Status calibrate_keep(const void *work, const Outcome *outcome, const StudyTools *tools,
+                      StudyPart *part, Problem *problem);
+Status calibrate_fold(void *work, size_t member, StudyPart *part);
+void calibrate_clear_part(StudyPart *part);
+void calibrate_free(void *work);
 
 #endif

@@ -9,9 +9,10 @@
 #include "core/base/json_pointer.h"
 #include "core/study/calibrate_search.h"
 
-enum { SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000, LAGS = 20 };
+enum { SAMPLES_MIN = 16, SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000, LAGS = 20 };
 
 static const double structured = 0.05;   // of the motion: rms of residuals that is not explained
+static const double rms_min = 1e-100;    // of measured samples: squares of less underflow
 static const double spectrum_misfit = 3; // of the expected rms
 
 const char *const calibrate_fit_names[] = {"time", "psd", NULL};
@@ -109,39 +110,75 @@ static const Field calibration_fields[] = {
 };
 // clang-format on
 
+// What rows cannot express of a measured channel.
+static Status calibrate_check_channel(const CalibrateStudy *study, double duration, size_t i,
+                                      Problem *problem) {
+    const size_t min = study->fit == CALIBRATE_PSD ? SPECTRUM_SAMPLES_MIN : SAMPLES_MIN;
+    const MeasuredChannel *measured = &study->measured.at[i];
+    const JsonPointer place = json_pointer_at("/study/measured", i);
+    const double end = measured_time(measured, measured->samples.count - 1);
+    const double from = fmax(measured->start, study->max_shift);
+    const double to = fmin(end, duration - study->max_shift);
+    if (end > duration * (1 + 1e-9))
+        return json_pointer_fault(problem, place.at, "samples",
+                                  "end at %s s, the scene ends at %s s: give the scene a longer "
+                                  "duration, or fewer samples",
+                                  real_text(end).at, real_text(duration).at);
+    if (!((to - from) / measured->interval + 1.000001 >= (double)min))
+        return json_pointer_fault(problem, place.at, "samples",
+                                  "must be at least %zu within the scene%s, for a fit of %s", min,
+                                  study->max_shift > 0 ? ", also when they are moved by max_shift"
+                                                       : "",
+                                  study->fit == CALIBRATE_PSD ? "spectra" : "motions");
+    if (!(measured_rms(measured) > rms_min))
+        return json_pointer_fault(
+            problem, place.at, "samples",
+            "have the same value, or differ by less than %g: there is no motion to "
+            "fit",
+            rms_min);
+    return STATUS_OK;
+}
+
+// That runs can have a measured channel, at its interval.
+static Status calibrate_check_base(const CalibrateStudy *study, const Simulation *simulation,
+                                   const SimulationLimits *limits, size_t i, Problem *own,
+                                   Problem *problem) {
+    MeasuredChannel channel = study->measured.at[i];
+    Simulation base = {0};
+    const JsonPointer place = json_pointer_at("/study/measured", i);
+    if (strcmp(channel.channel, CHANNEL_USUAL) == 0)
+        return json_pointer_fault(problem, place.at, "channel",
+                                  "must name one channel, as displacement");
+    channel.interval = study->measured.at[0].interval;
+    problem_clear(own);
+    Status status = calibrate_make_base(&(MeasuredChannels){&channel, 1}, simulation,
+                                        simulation->scene.duration, &base);
+    if (status == STATUS_OK)
+        status = simulation_complete(&base, limits, NULL, own);
+    simulation_clear(&base);
+    const Fault *fault = &own->faults[0];
+    if (status == STATUS_INVALID && strncmp(fault->pointer, "/output/channels", 16) == 0)
+        return json_pointer_fault(problem, place.at, "channel", "%s", fault->detail);
+    return status == STATUS_INVALID ? json_pointer_fault(problem, "/study/measured/0", "interval",
+                                                         "gives a scene that is not valid: %s: %s",
+                                                         fault->pointer, fault->detail)
+                                    : status;
+}
+
 static Status calibrate_check_measured(const CalibrateStudy *study, const Simulation *simulation,
+                                       const SimulationLimits *limits, Problem *own,
                                        Problem *problem) {
-    const double duration = simulation->scene.duration;
-    const size_t min = study->fit == CALIBRATE_PSD ? SPECTRUM_SAMPLES_MIN : CALIBRATE_SAMPLES_MIN;
     Status status = STATUS_OK;
     size_t samples = 0;
     if (study->measured.count == 0)
         return problem_add(problem, STATUS_INVALID, "/study/measured",
                            "must have at least one measured channel");
     for (size_t i = 0; i < study->measured.count; i++) {
-        const MeasuredChannel *measured = &study->measured.at[i];
-        const JsonPointer place = json_pointer_at("/study/measured", i);
-        const double end = measured_time(measured, measured->samples.count - 1);
-        const double from = fmax(measured->start, study->max_shift);
-        const double to = fmin(end, duration - study->max_shift);
-        samples += measured->samples.count;
-        if (strcmp(measured->channel, CHANNEL_USUAL) == 0)
-            status = json_pointer_fault(problem, place.at, "channel",
-                                        "must name one channel, as displacement");
-        if (end > duration * (1 + 1e-9))
-            status = json_pointer_fault(problem, place.at, "samples",
-                                        "end at %s s, the scene ends at %s s: give the scene a "
-                                        "longer duration, or fewer samples",
-                                        real_text(end).at, real_text(duration).at);
-        else if (!((to - from) / measured->interval + 1.000001 >= (double)min))
-            status = json_pointer_fault(
-                problem, place.at, "samples",
-                "must be at least %zu within the scene%s, for a fit of %s", min,
-                study->max_shift > 0 ? ", also when they are moved by max_shift" : "",
-                study->fit == CALIBRATE_PSD ? "spectra" : "motions");
-        else if (!(measured_rms(measured) > 0))
-            status = json_pointer_fault(problem, place.at, "samples",
-                                        "all have the same value: there is no motion to fit");
+        samples += study->measured.at[i].samples.count;
+        status = study_first_failure(
+            status, calibrate_check_channel(study, simulation->scene.duration, i, problem));
+        status = study_first_failure(
+            status, calibrate_check_base(study, simulation, limits, i, own, problem));
     }
     if (samples > MEASURED_SAMPLES)
         status = problem_add(problem, STATUS_INVALID, "/study/measured",
@@ -154,76 +191,44 @@ static Status calibrate_check_measured(const CalibrateStudy *study, const Simula
     return status;
 }
 
-// Members that are not part of the physics.
-static Status calibrate_check_pointer(const char *pointer, const Field *row, bool is_tag,
-                                      const char *place, Problem *problem) {
+// That a parameter is a real number, and each end of its range possible in the scene as it is.
+static Status calibrate_check_parameter(const CalibrateStudy *study, const Simulation *simulation,
+                                        const SimulationLimits *limits, size_t i, Simulation *copy,
+                                        Problem *own, Problem *problem) {
+    const StudyAxes *axes = &study->parameters;
+    const JsonPointer place = json_pointer_at("/study/parameters", i);
+    bool is_tag = false;
+    const Field *row = study_axis_find(&axes->at[i], copy, &is_tag, place.at, problem);
+    if (row == NULL)
+        return STATUS_INVALID;
     if (is_tag || (row->kind != FIELD_KIND_REAL && row->kind != FIELD_KIND_REALS &&
                    row->kind != FIELD_KIND_ROWS))
-        return problem_add(problem, STATUS_INVALID, place, "%s is not a real number", pointer);
-    return STATUS_OK;
-}
-
-// The scene with all parameters in the middle but one.
-static Status calibrate_check_end(const CalibrateStudy *study, const Simulation *base,
-                                  const SimulationLimits *limits, size_t changed, double u,
-                                  Problem *problem) {
-    StudyValue values[CALIBRATE_PARAMETERS];
-    const StudyAxes *axes = &study->parameters;
-    for (size_t i = 0; i < axes->count; i++)
-        values[i] = (StudyValue){NULL, calibrate_value(&axes->at[i], i == changed ? u : 0.5)};
-    Simulation scene = {0};
-    Problem *own = calloc(1, sizeof *own);
-    TRY(status_made(own != NULL));
-    const Status status =
-        study_scene_make(base, axes, values, &study->names, false, limits, &scene, own);
-    simulation_clear(&scene);
-    static const char before[] = "/output/channels/";
-    for (size_t i = 0; i < own->count && i < PROBLEM_FAULTS && status == STATUS_INVALID; i++) {
-        const Fault *fault = &own->faults[i];
-        if (strncmp(fault->pointer, before, sizeof before - 1) == 0) {
-            const size_t channel = strtoul(fault->pointer + sizeof before - 1, NULL, 10);
-            const char *name = base->output.channels.at[channel];
-            for (size_t k = 0; k < study->measured.count; k++)
-                if (strcmp(study->measured.at[k].channel, name) == 0)
-                    (void)json_pointer_fault(problem, json_pointer_at("/study/measured", k).at,
-                                             "channel", "%s", fault->detail);
-            continue;
-        }
-        const JsonPointer axis = changed < axes->count
-                                     ? json_pointer_at("/study/parameters", changed)
-                                     : (JsonPointer){"/study/parameters"};
-        if (changed < axes->count)
-            (void)json_pointer_fault(problem, axis.at, u > 0 ? "to" : "from",
-                                     "gives a scene that is not valid: %s: %s", fault->pointer,
-                                     fault->detail);
-        else
-            (void)problem_add(problem, STATUS_INVALID, axis.at,
-                              "give, in the middle of their ranges, a scene that is not valid: "
-                              "%s: %s",
-                              fault->pointer, fault->detail);
+        return problem_add(problem, STATUS_INVALID, place.at, "%s is not a real number",
+                           study_axis_pointer(&axes->at[i], 0));
+    Status status = STATUS_OK;
+    for (int end = 0; end < 2; end++) {
+        StudyValue values[CALIBRATE_PARAMETERS];
+        Simulation scene = {0};
+        for (size_t k = 0; k < axes->count; k++)
+            values[k] =
+                (StudyValue){NULL, k == i ? calibrate_value(&axes->at[i], end) : (double)NAN};
+        problem_clear(own);
+        const Status made =
+            study_scene_make(simulation, axes, values, &study->names, true, limits, &scene, own);
+        simulation_clear(&scene);
+        status = study_first_failure(
+            status, made == STATUS_INVALID
+                        ? json_pointer_fault(problem, place.at, end == 0 ? "from" : "to",
+                                             "gives a scene that is not valid: %s: %s",
+                                             own->faults[0].pointer, own->faults[0].detail)
+                        : made);
     }
-    if (status != STATUS_OK && status != STATUS_INVALID)
-        (void)problem_set(problem, status, "%s", own->detail);
-    free(own);
     return status;
 }
 
-static Status calibrate_check_ends(const CalibrateStudy *study, const Simulation *simulation,
-                                   const SimulationLimits *limits, Problem *problem) {
-    Simulation base = {0};
-    const size_t count = study->parameters.count;
-    Status status = calibrate_make_base(study, simulation, simulation->scene.duration, &base);
-    if (status == STATUS_OK)
-        status = calibrate_check_end(study, &base, limits, count, 0.5, problem);
-    for (size_t i = 0; i < 2 * count && status == STATUS_OK; i++)
-        status = calibrate_check_end(study, &base, limits, i / 2, (double)(i % 2), problem);
-    simulation_clear(&base);
-    return status;
-}
-
-static Status calibrate_complete(void *request, const Simulation *simulation,
-                                 const SimulationLimits *limits, Problem *problem) {
-    CalibrateStudy *study = request;
+static Status calibrate_check_parameters(const CalibrateStudy *study, const Simulation *simulation,
+                                         const SimulationLimits *limits, Problem *own,
+                                         Problem *problem) {
     static const char place[] = "/study/parameters";
     const StudyAxes *axes = &study->parameters;
     Status status = study_axes_check(axes, false, place, problem);
@@ -234,23 +239,26 @@ static Status calibrate_complete(void *request, const Simulation *simulation,
         if (axes->at[i].values.count > 0)
             status = json_pointer_fault(problem, json_pointer_at(place, i).at, "values",
                                         "cannot be fitted: give a range, from and to");
-    status = study_first_failure(status, calibrate_check_measured(study, simulation, problem));
     TRY(status);
-    TRY(study_axes_find(axes, simulation, place, problem));
-    Simulation scene = {0};
-    status = fields_copy(simulation_fields, simulation, &scene);
-    for (size_t i = 0; i < axes->count && status != STATUS_NO_MEMORY; i++) {
-        bool is_tag = false;
-        const JsonPointer own = json_pointer_at(place, i);
-        const Field *row = study_axis_find(&axes->at[i], &scene, &is_tag, own.at, problem);
-        for (size_t k = 0; row != NULL && k < study_axis_pointer_count(&axes->at[i]); k++)
-            if (calibrate_check_pointer(study_axis_pointer(&axes->at[i], k), row, is_tag, own.at,
-                                        problem) != STATUS_OK)
-                status = STATUS_INVALID;
-    }
-    simulation_clear(&scene);
-    TRY(status);
-    return calibrate_check_ends(study, simulation, limits, problem);
+    Simulation copy = {0};
+    status = fields_copy(simulation_fields, simulation, &copy);
+    for (size_t i = 0; i < axes->count && status != STATUS_NO_MEMORY; i++)
+        status = study_first_failure(
+            status, calibrate_check_parameter(study, simulation, limits, i, &copy, own, problem));
+    simulation_clear(&copy);
+    return status;
+}
+
+static Status calibrate_complete(void *request, const Simulation *simulation,
+                                 const SimulationLimits *limits, Problem *problem) {
+    const CalibrateStudy *study = request;
+    Problem *own = malloc(sizeof *own); // of scenes that are tried
+    TRY(status_made(own != NULL));
+    const Status status =
+        study_first_failure(calibrate_check_parameters(study, simulation, limits, own, problem),
+                            calibrate_check_measured(study, simulation, limits, own, problem));
+    free(own);
+    return status;
 }
 
 // Runs of the search at the full duration, about.
@@ -263,7 +271,8 @@ static Status calibrate_cost(const void *request, const Simulation *simulation,
     const CalibrateStudy *study = request;
     Simulation base = {0};
     (void)limits;
-    const Status status = calibrate_make_base(study, simulation, simulation->scene.duration, &base);
+    const Status status =
+        calibrate_make_base(&study->measured, simulation, simulation->scene.duration, &base);
     if (status == STATUS_OK)
         *steps = calibrate_expected(study) * simulation_cost(&base).steps;
     simulation_clear(&base);
@@ -275,69 +284,6 @@ static void calibrate_references(void *request, StudyReferences *references) {
     *references = (StudyReferences){
         .axes = &study->parameters, .axes_place = "/study/parameters", .names = &study->names};
 }
-static Status calibrate_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
-                              Problem *problem) {
-    const CalibrateWork *work = of;
-    const StudyAxes *axes = &work->study->parameters;
-    const CalibrateRun *run = &work->runs[member - work->first];
-    StudyValue values[CALIBRATE_PARAMETERS];
-    ((CalibratePart *)(void *)part)->run = run;
-    for (size_t i = 0; i < axes->count; i++)
-        values[i] = (StudyValue){NULL, calibrate_value(&axes->at[i], run->at[i])};
-    return study_scene_make(&work->base, axes, values, &work->study->names, false,
-                            work->work.limits, scene, problem);
-}
-
-static Status calibrate_keep(const void *of, const Outcome *outcome, const StudyTools *tools,
-                             StudyPart *base, Problem *problem) {
-    const CalibrateWork *work = of;
-    CalibratePart *part = (CalibratePart *)(void *)base;
-    const bool has_slope = calibrate_has_shift(work) && part->run->step == 0;
-    FftCache *cache = tools->workspace != NULL ? &tools->workspace->transforms : NULL;
-    part->residual = calloc(work->rows + 1, sizeof(double));
-    part->slope = has_slope ? calloc(work->rows + 1, sizeof(double)) : NULL;
-    TRY(status_made(part->residual != NULL && (part->slope != NULL || !has_slope)));
-    for (size_t c = 0; c < work->study->measured.count; c++) {
-        const MeasuredTarget *target = &work->targets[c];
-        double *residual = part->residual + target->place;
-        double *slope = has_slope ? part->slope + target->place : NULL;
-        TRY(measured_target_model(target, &outcome->response, calibrate_shift(work, part->run->at),
-                                  cache, residual, slope, problem));
-        for (size_t i = 0; i < target->values.count; i++) {
-            residual[i] = (residual[i] - target->values.at[i]) / target->deviation;
-            if (has_slope)
-                slope[i] *= 2 * work->study->max_shift / target->deviation;
-        }
-    }
-    return STATUS_OK;
-}
-
-static void calibrate_clear_part(StudyPart *base) {
-    CalibratePart *part = (CalibratePart *)(void *)base;
-    free(part->residual);
-    free(part->slope);
-}
-static Status calibrate_fold(void *of, size_t member, StudyPart *part) {
-    CalibrateWork *work = of;
-    Calibration *answer = work->answer;
-    const RunRecord *run = &part->run;
-    answer->runs++;
-    if (run->status != STATUS_OK) {
-        answer->failed++;
-        TRY(study_failures_add(&answer->failures, (int)run->status, status_slug(run->status),
-                               member, run->why));
-    }
-    return calibrate_search_fold(work, member, (CalibratePart *)(void *)part);
-}
-static Status calibrate_begin(void *of, const StudyTools *tools, Problem *problem) {
-    CalibrateWork *work = of;
-    (void)tools;
-    (void)problem;
-    work->study = work->work.study;
-    work->answer = work->work.answer;
-    return calibrate_search_begin(work);
-}
-
 // Values with their errors, residuals, the verdict in words.
 
 static const char *calibrate_pointer(const CalibrateWork *work, size_t i) {
@@ -346,7 +292,6 @@ static const char *calibrate_pointer(const CalibrateWork *work, size_t i) {
 
 static Status calibrate_report_parameter(CalibrateWork *work, size_t i, Simulation *scene) {
     const StudyAxis *axis = &work->study->parameters.at[i];
-    const CalibrateStart *best = calibrate_best(work);
     const CalibrateAssessment *found = &work->assessment;
     CalibratedParameter *parameter = list_append(&work->answer->parameters, sizeof *parameter);
     TRY(status_made(parameter != NULL));
@@ -357,17 +302,20 @@ static Status calibrate_report_parameter(CalibrateWork *work, size_t i, Simulati
     bool is_tag = false;
     const Field *row = study_axis_find(axis, scene, &is_tag, "", NULL);
     TRY(text_copy(row != NULL ? row->unit : NULL, &parameter->unit));
-    if (best == NULL)
+    if (work->start_count == 0)
         return STATUS_OK;
-    const double u = best->at[i];
+    const double u = work->starts[0].fit.at[i];
     parameter->value = calibrate_value(axis, u);
     parameter->is_identifiable = found->reasons[i] == UNDETERMINED_NOT;
     if (found->reasons[i] == UNDETERMINED_WIDE)
         return STATUS_OK;
-    parameter->standard_error = found->errors[i] * calibrate_derivative(axis, u);
+    parameter->standard_error =
+        found->errors[i] * (calibrate_is_logarithmic(axis)
+                                ? parameter->value * log(axis->to / axis->from)
+                                : axis->to - axis->from);
     TRY(status_made(reals_allocate(&parameter->interval_95, 2)));
-    parameter->interval_95.at[0] = calibrate_value_beyond(axis, found->low[i]);
-    parameter->interval_95.at[1] = calibrate_value_beyond(axis, found->high[i]);
+    parameter->interval_95.at[0] = calibrate_value(axis, found->low[i]);
+    parameter->interval_95.at[1] = calibrate_value(axis, found->high[i]);
     return STATUS_OK;
 }
 
@@ -390,7 +338,7 @@ static Status calibrate_report_correlation(CalibrateWork *work) {
 
 static Status calibrate_report_channel(CalibrateWork *work, size_t c) {
     const MeasuredTarget *target = &work->targets[c];
-    const CalibrateStart *best = calibrate_best(work);
+    const CalibrateStart *best = work->starts;
     const size_t count = target->values.count;
     const double *own = best->residual + target->place;
     CalibrationResidual *residual = list_append(&work->answer->residuals, sizeof *residual);
@@ -404,7 +352,8 @@ static Status calibrate_report_channel(CalibrateWork *work, size_t c) {
     residual->rms =
         decibels * target->deviation * sqrt(calibrate_sum_squares(own, count) / (double)count);
     residual->measured_rms = target->is_spectrum ? (double)NAN : measured_rms(measured);
-    residual->deviation = decibels * target->deviation;
+    residual->deviation =
+        decibels * (target->is_spectrum ? target->deviation : work->deviations[c]);
     residual->samples = target->samples;
     motion->is_spectrum = target->is_spectrum;
     TRY(text_copy(measured->channel, &residual->channel));
@@ -447,7 +396,7 @@ static bool calibrate_is_correlated(const double *residual, size_t count) {
 // Whether the model explains the measured motions, and a sentence if not.
 static Status calibrate_check_fit(CalibrateWork *work, bool *is_explained) {
     Calibration *answer = work->answer;
-    const CalibrateStart *best = calibrate_best(work);
+    const CalibrateStart *best = work->starts;
     double chi_square = 0;
     size_t given = 0;
     *is_explained = true;
@@ -518,12 +467,12 @@ static Status calibrate_explain(CalibrateWork *work, size_t i) {
     if (found->reasons[i] == UNDETERMINED_RIVAL)
         return status_made(text_format(detail,
                                        "%s is not determined: %.4g and %.4g fit equally well",
-                                       pointer, calibrate_value(axis, calibrate_best(work)->at[i]),
+                                       pointer, calibrate_value(axis, work->starts[0].fit.at[i]),
                                        calibrate_value(axis, found->rivals[i])));
     if (found->reasons[i] == UNDETERMINED_BOUND)
         return status_made(text_format(
             detail, "%s ends at %.4g, the end of its range: the best value lies beyond, widen it",
-            pointer, calibrate_value(axis, calibrate_best(work)->at[i])));
+            pointer, calibrate_value(axis, work->starts[0].fit.at[i])));
     size_t partner = i;
     for (size_t k = 0; k < work->parameters; k++)
         if (k != i && found->reasons[k] == UNDETERMINED_WIDE &&
@@ -574,35 +523,36 @@ static Status calibrate_report_verdict(CalibrateWork *work) {
 
 static Status calibrate_warn(CalibrateWork *work) {
     Calibration *answer = work->answer;
-    const CalibrateStart *best = calibrate_best(work);
-    if (work->is_limited && work->fit == CALIBRATE_TIME)
+    const CalibrateStart *best = work->starts;
+    if (work->limit > 0 && work->fit == CALIBRATE_TIME)
         TRY(warnings_add(&answer->warnings, "/study/measured",
                          "small errors grow too fast to predict the motion beyond about %.3g s: "
                          "only the samples before were fitted",
-                         work->horizon));
-    if (work->is_limited && work->fit == CALIBRATE_PSD)
+                         work->limit));
+    if (work->limit > 0 && work->fit == CALIBRATE_PSD)
         TRY(warnings_add(&answer->warnings, "/study/fit",
                          "small errors grow too fast to predict the motion beyond about %.3g s, "
                          "which is too short to determine the parameters: spectra were fitted",
-                         work->horizon));
+                         work->limit));
     if (work->study->fit == CALIBRATE_PSD && work->is_chaotic)
         TRY(warnings_add(&answer->warnings, "/study/fit",
                          "the motion cannot be predicted to the end of the record: its spectrum "
                          "changes with the smallest errors, and the fit is accordingly uncertain"));
     for (size_t i = 0; i < work->parameters; i++)
-        if (best->at[i] < 1e-9 || best->at[i] > 1 - 1e-9)
+        if (best->fit.at[i] < 1e-9 || best->fit.at[i] > 1 - 1e-9)
             TRY(warnings_add(&answer->warnings, json_pointer_at("/study/parameters", i).at,
                              "the best value, %.4g, is the end of the range: a wider range may fit "
                              "better",
-                             calibrate_value(&work->study->parameters.at[i], best->at[i])));
-    if (calibrate_has_shift(work) && fabs(best->at[work->parameters] - 0.5) > 0.5 - 1e-9)
+                             calibrate_value(&work->study->parameters.at[i], best->fit.at[i])));
+    if (work->variables > work->parameters &&
+        fabs(best->fit.at[work->parameters] - 0.5) > 0.5 - 1e-9)
         TRY(warnings_add(&answer->warnings, "/study/max_shift",
                          "the fitted shift is the largest allowed one"));
     return STATUS_OK;
 }
 static Status calibrate_report(CalibrateWork *work) {
     Calibration *answer = work->answer;
-    const CalibrateStart *best = calibrate_best(work);
+    const CalibrateStart *best = work->starts;
     Simulation scene = {0};
     answer->fit = work->fit;
     Status status = fields_copy(simulation_fields, work->work.simulation, &scene);
@@ -610,7 +560,7 @@ static Status calibrate_report(CalibrateWork *work) {
         status = calibrate_report_parameter(work, i, &scene);
     simulation_clear(&scene);
     TRY(status);
-    if (best == NULL || best->residual == NULL) {
+    if (work->start_count == 0) {
         answer->verdict = CALIBRATE_NOT_EXPLAINED;
         return status_made(text_format(&answer->detail, "none of the %llu runs ended: see failures",
                                        (unsigned long long)answer->runs));
@@ -618,8 +568,8 @@ static Status calibrate_report(CalibrateWork *work) {
     TRY(calibrate_report_correlation(work));
     for (size_t c = 0; c < work->study->measured.count; c++)
         TRY(calibrate_report_channel(work, c));
-    answer->shift = calibrate_shift(work, best->at);
-    if (calibrate_has_shift(work))
+    answer->shift = calibrate_shift(work, best->fit.at);
+    if (work->variables > work->parameters)
         answer->shift_error =
             work->assessment.errors[work->parameters] * 2 * work->study->max_shift;
     TRY(calibrate_report_verdict(work));
@@ -630,10 +580,6 @@ static Status calibrate_end(void *of, const StudyTools *tools, Problem *problem)
     (void)tools;
     (void)problem;
     return calibrate_report(of);
-}
-
-static void calibrate_free(void *of) {
-    calibrate_search_free(of);
 }
 
 static Status calibrate_solution(const void *request, const Variant *answer, StudyValue *values,

@@ -14,26 +14,47 @@ static NormalEquations equations_of(const double residual[3]) {
     return equations;
 }
 
+// A search without damping at a point, where the sum of squares is `cost`.
+static LeastSquares search_of(const double residual[3], const double at[2], double cost) {
+    LeastSquares search = {.at = {at[0], at[1]}, .cost = cost, .equations = equations_of(residual)};
+    least_squares_begin(&search);
+    search.damping = 0;
+    return search;
+}
+
 TEST(an_undamped_step_solves_a_linear_problem) {
     // r = J (at - (0.6, 0.3)).
-    const double residual[] = {-0.6, -0.9, -0.6}, at[] = {0, 0};
-    double to[2];
-    const NormalEquations equations = equations_of(residual);
-    const double decrease = least_squares_step(&equations, 0, at, to);
-    assert_true(fabs(to[0] - 0.6) < 1e-9 && fabs(to[1] - 0.3) < 1e-9);
-    assert_true(fabs(decrease - (0.36 + 0.81 + 0.36)) < 1e-9);
+    const double residual[] = {-0.6, -0.9, -0.6}, at[] = {0, 0}, cost = 0.36 + 0.81 + 0.36;
+    LeastSquares search = search_of(residual, at, cost);
+    assert_true(least_squares_step(&search, 0));
+    assert_true(fabs(search.trial[0] - 0.6) < 1e-9 && fabs(search.trial[1] - 0.3) < 1e-9);
+    assert_true(fabs(search.predicted - cost) < 1e-9);
 }
 
 TEST(a_step_stays_within_the_bounds_and_is_the_best_one_there) {
     // r = J (at - (2, 0.3)): u is at most 1, and then v is best at 0.3 + 1 / 5.
     const double residual[] = {-2, -2.3, -0.6}, at[] = {0, 0};
-    double to[2];
-    const NormalEquations equations = equations_of(residual);
-    assert_true(least_squares_step(&equations, 0, at, to) > 0);
-    assert_true(to[0] == 1 && fabs(to[1] - 0.5) < 1e-9);
+    LeastSquares search = search_of(residual, at, 10);
+    assert_true(least_squares_step(&search, 0));
+    assert_true(search.trial[0] == 1 && fabs(search.trial[1] - 0.5) < 1e-9);
     const double bound[] = {1, 0.5}, at_bound[] = {-1, -0.8, 0.4};
-    const NormalEquations there = equations_of(at_bound);
-    assert_true(least_squares_step(&there, 0, bound, to) < 1e-9);
+    LeastSquares there = search_of(at_bound, bound, 2);
+    assert_false(least_squares_step(&there, 1e-9));
+}
+
+TEST(a_search_moves_to_better_points_alone_and_damps_the_steps_after_worse_ones) {
+    const double residual[] = {-0.6, -0.9, -0.6}, at[] = {0, 0};
+    LeastSquares search = search_of(residual, at, 1.53);
+    least_squares_begin(&search);
+    assert_true(least_squares_step(&search, 0));
+    const double first_step = search.trial[0], damping = search.damping;
+    assert_false(least_squares_move(&search, 2));
+    assert_false(least_squares_move(&search, (double)NAN));
+    assert_true(search.at[0] == 0 && search.cost == 1.53 && search.damping > 4 * damping);
+    search.damping = 1;
+    assert_true(least_squares_step(&search, 0) && search.trial[0] < 0.9 * first_step);
+    assert_true(least_squares_move(&search, 0.1));
+    assert_true(search.at[0] == search.trial[0] && search.cost == 0.1 && search.damping < 1.01);
 }
 
 TEST(the_covariance_is_the_inverse_and_drawn_steps_have_it) {
@@ -62,11 +83,11 @@ TEST(a_variable_without_effect_has_an_infinite_variance_and_others_are_not_distu
     static const double none[] = {0, 0, 0};
     const double *const both[] = {first, none};
     const double residual[] = {-0.5, -0.5, 0}, at[] = {0, 0.25};
-    NormalEquations equations;
-    double covariance[4], to[2];
-    normal_equations_make(both, 2, residual, 3, &equations);
-    least_squares_covariance(&equations, covariance);
+    LeastSquares search = search_of(residual, at, 0.5);
+    double covariance[4];
+    normal_equations_make(both, 2, residual, 3, &search.equations);
+    least_squares_covariance(&search.equations, covariance);
     assert_true(isinf(covariance[3]) && fabs(covariance[0] - 0.5) < 1e-9);
-    assert_true(least_squares_step(&equations, 1e-9, at, to) > 0);
-    assert_true(fabs(to[0] - 0.5) < 1e-6 && to[1] == 0.25);
+    assert_true(least_squares_step(&search, 0));
+    assert_true(fabs(search.trial[0] - 0.5) < 1e-6 && search.trial[1] == 0.25);
 }
