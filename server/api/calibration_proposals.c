@@ -11,6 +11,9 @@
 #include "server/materials/material.h"
 #include "server/util/base_path.h"
 
+// Of a fitted number from the one before: both a share of it and many standard errors.
+static const double far_share = 0.2, far_errors = 4;
+
 // A fitted parameter of a buffer by its member's name, of damper `damper` (from 1) or, if 0, of the
 // first one that has it; NULL: none.
 static const CalibratedParameter *calibration_find(const Calibration *calibration, uint64_t damper,
@@ -42,7 +45,8 @@ static const char *calibration_refuse(const Calibration *calibration,
     return NULL;
 }
 
-// The head with the fitted numbers, valid at any speed: what only drop tests tell is removed.
+// The head with the fitted numbers, which hold for the masses of the scene and at any speed: what
+// only drop tests tell, as their impactor and base, is removed.
 static Status calibration_describe(const Material *head, const char *result,
                                    const CalibratedParameter *restitution,
                                    const CalibratedParameter *contact_time, Material *material) {
@@ -51,12 +55,30 @@ static Status calibration_describe(const Material *head, const char *result,
     material->restitution_deviation = restitution->standard_error;
     material->contact_time = contact_time->value;
     material->contact_time_deviation = contact_time->standard_error;
-    material->least_speed = material->most_speed = (double)NAN;
+    material->least_speed = material->most_speed = material->least_temperature =
+        material->most_temperature = material->impactor_mass = material->base_mass = (double)NAN;
+    material->separation = material->base = CHOICE_ABSENT;
+    free(material->impactor);
+    material->impactor = NULL;
     free(material->table.at);
     free(material->measurements.at);
     material->table = (MaterialRows){NULL, 0};
     material->measurements = (Reals){NULL, 0};
     return status_made(text_format(&material->source, "calibration %s", result));
+}
+
+// A fitted number that is far from that of the head may be another material's.
+static Status calibration_compare(const CalibratedParameter *fitted, double head, double deviation,
+                                  const char *pointer, Warnings *warnings) {
+    const double errors =
+        isnan(deviation) ? fitted->standard_error : hypot(fitted->standard_error, deviation);
+    const double difference = fabs(fitted->value - head);
+    if (!(difference > far_share * fabs(head) && difference > far_errors * errors))
+        return STATUS_OK;
+    return warnings_add(warnings, pointer,
+                        "%.4g, fitted to %s, is far from that of the latest revision, %.4g: is "
+                        "the buffer of the scene made of this material?",
+                        fitted->value, fitted->pointer, head);
 }
 
 static Status calibration_write(const MaterialRevision *head, const ResultRow *row,
@@ -72,6 +94,7 @@ static Status calibration_write(const MaterialRevision *head, const ResultRow *r
     const char *why = calibration_refuse(calibration, restitution, contact_time);
     const char *base = base_path();
     Material material = {.name = NULL};
+    Warnings warnings = {NULL, 0};
     Status status = STATUS_OK;
     bytes_json(bytes, "{\"slug\": %s, \"result\": %s, \"revision\": ", head->slug, row->id);
     if (why == NULL) { // as POST to /revisions takes it
@@ -80,13 +103,29 @@ static Status calibration_write(const MaterialRevision *head, const ResultRow *r
         bytes_text(bytes, "{");
         if (status == STATUS_OK)
             (void)encode_members(bytes, material_fields, &material, WRITE_SCENE);
-        bytes_json(bytes, ", \"comment\": \"from calibration %s\"}", row->id);
+        bytes_json(bytes,
+                   ", \"comment\": \"%s %g, %s %g s, fitted for the masses of the scene of "
+                   "calibration %s\"}",
+                   restitution->pointer, restitution->value, contact_time->pointer,
+                   contact_time->value, row->id);
         fields_clear(material_fields, &material);
+        status = status_first(
+            (const Status[]){status,
+                             calibration_compare(restitution, head->material.restitution,
+                                                 head->material.restitution_deviation,
+                                                 "/revision/restitution", &warnings),
+                             calibration_compare(contact_time, head->material.contact_time,
+                                                 head->material.contact_time_deviation,
+                                                 "/revision/contact_time", &warnings)},
+            3);
     } else {
         bytes_text(bytes, "null");
     }
     bytes_text(bytes, ", \"why\": ");
     bytes_json_string(bytes, why);
+    bytes_text(bytes, ", \"warnings\": ");
+    document_warnings(bytes, &warnings);
+    warnings_clear(&warnings);
     bytes_json(bytes,
                ", \"links\": {\"calibration\": \"%s/v1/results/%s/calibration.json\", "
                "\"confirm\": \"%s/v1/materials/%s/revisions\", \"material\": "

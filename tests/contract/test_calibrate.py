@@ -33,6 +33,13 @@ def test_a_calibration_becomes_a_revision_of_a_material():
         asked = daemon.request("POST", f"/v1/results/{result}/calibration/proposal?material=sponge")
         proposal = asked.json()
         assert proposal["why"] is None and proposal["revision"]["restitution"] == answer["parameters"][0]["value"]
+        assert proposal["warnings"] == [], proposal
+        # What the old revision says of its own test does not hold for the numbers of the scene.
+        assert proposal["revision"].get("impactor_mass") is None and proposal["revision"].get("base") is None
+        assert "/dampers/0/buffer/restitution 0.6" in proposal["revision"]["comment"], proposal
+        other = daemon.request("POST", f"/v1/results/{result}/calibration/proposal?material=aluminium").json()
+        assert [warning["pointer"] for warning in other["warnings"]] == ["/revision/restitution",
+                                                                         "/revision/contact_time"], other
         confirmed = daemon.request("POST", proposal["links"]["confirm"], json=proposal["revision"],
                                    headers={"If-Match": asked.headers["etag"]})
         assert confirmed.status == 201, confirmed
