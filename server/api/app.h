@@ -82,6 +82,10 @@ extern const char no_impacts[]; // why a result has no list of impacts
 // The answer of the study of a row that has one. Cleared by fields_clear(study_answer_fields, ...)
 // in any case.
 Status study_read(const ResultRow *row, StudyAnswer *answer, Problem *problem);
+// The row of the request's result with the answer of its study, which must be of this kind. Both
+// are cleared in any case. STATUS_NOT_FOUND. studies.c.
+Status study_load(App *app, const Request *request, const StudyKind *kind, ResultRow *row,
+                  StudyAnswer *answer, Problem *problem);
 
 // --- tables of numbers, columns.c ---
 

@@ -135,18 +135,6 @@ static Status calibration_write(const MaterialRevision *head, const ResultRow *r
                                : problem_set(problem, status, "no memory for the proposal");
 }
 
-static Status calibration_load(App *app, const Request *request, ResultRow *row,
-                               StudyAnswer *answer, Problem *problem) {
-    TRY(db_result_load(app->db, request->parameters[0], row, problem));
-    if (row->study != NULL)
-        TRY(study_read(row, answer, problem));
-    if (answer->study == NULL || answer->study->kind != study_calibrate.answer)
-        return problem_set(problem, STATUS_NOT_FOUND,
-                           "the scene asked for no study \"calibrate\": submit it with a member "
-                           "study");
-    return STATUS_OK;
-}
-
 Status calibrations_propose(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request_query(request, "material");
     double damper;
@@ -161,7 +149,7 @@ Status calibrations_propose(App *app, const Request *request, Reply *reply, Prob
     MaterialState state = {0, 0, 0};
     char tag[MATERIAL_TAG];
     Bytes bytes = {.most = app->reply_most};
-    Status status = calibration_load(app, request, &row, &answer, problem);
+    Status status = study_load(app, request, &study_calibrate, &row, &answer, problem);
     if (status == STATUS_OK)
         status = db_material_state(app->db, slug, &state, problem);
     if (status == STATUS_OK)

@@ -192,19 +192,10 @@ static Status upload_warn(const RecordLook *look, const RecordRow *row, Warnings
 
 static Status upload_measure(RecordUpload *upload, Problem *problem) {
     RecordRow *row = &upload->row;
-    char digest[RECORD_DIGEST_SIZE];
     const RecordLook look = record_look(&upload->samples, row->interval, 1);
-    record_digest(row->interval, &upload->samples, digest);
-    row->count = upload->samples.count;
-    row->peak = fmax(look.highest, -look.lowest);
-    row->peak_time = (double)look.peak_at / (1 / row->interval);
-    row->peak_velocity = look.peak_velocity;
-    row->end_velocity = look.end_velocity;
     row->created_unix_ms = clock_unix_ms();
-    TRY(upload_copy(&row->unit, acceleration_unit_names[upload->unit], problem));
-    if (digest[0] == '\0')
+    if (record_row_measure(row, &upload->samples, upload->unit) != STATUS_OK)
         return upload_no_memory(problem);
-    TRY(upload_copy(&row->digest, digest, problem));
     if (!isfinite(look.peak_velocity) || !isfinite(row->peak_time))
         return problem_add(problem, STATUS_INVALID, "/samples",
                            "must move the base at a speed that a number can hold");

@@ -11,19 +11,23 @@
 #include "server/jobs/sweep.h"
 #include "server/util/base_path.h"
 
-static Status study_error_kind(const StudyKind *kind, Problem *problem) {
-    return problem_set(problem, STATUS_NOT_FOUND,
-                       "the scene asked for no study \"%s\": submit it with a member study",
-                       kind->kind.name);
-}
-
-static Status study_read_kind(const ResultRow *row, const StudyKind *kind, StudyAnswer *answer,
-                              Problem *problem) {
+Status study_load(App *app, const Request *request, const StudyKind *kind, ResultRow *row,
+                  StudyAnswer *answer, Problem *problem) {
     *answer = (StudyAnswer){NULL};
-    if (row->study == NULL)
-        return study_error_kind(kind, problem);
-    TRY(study_read(row, answer, problem));
-    return answer->study->kind == kind->answer ? STATUS_OK : study_error_kind(kind, problem);
+    TRY(db_result_load(app->db, request->parameters[0], row, problem));
+    if (row->study != NULL)
+        TRY(study_read(row, answer, problem));
+    if (answer->study != NULL && answer->study->kind == kind->answer)
+        return STATUS_OK;
+    const StudyKind *own = answer->study != NULL ? study_of_answer(answer->study->kind) : NULL;
+    return own == NULL
+               ? problem_set(problem, STATUS_NOT_FOUND,
+                             "the scene asked for no study \"%s\": submit it with a member study",
+                             kind->kind.name)
+               : problem_set(problem, STATUS_NOT_FOUND,
+                             "the scene asked for the study \"%s\", not for \"%s\": its answer is "
+                             "%s.json",
+                             own->kind.name, kind->kind.name, study_document_name(own));
 }
 
 // The format by the extension in the request's second parameter, else by Accept.
@@ -58,9 +62,7 @@ Status results_study(App *app, const Request *request, Reply *reply, Problem *pr
     StudyAnswer answer = {NULL};
     Bytes bytes = {.most = app->reply_most};
     char tag[128];
-    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
-    if (status == STATUS_OK)
-        status = study_read_kind(&row, kind, &answer, problem);
+    Status status = study_load(app, request, kind, &row, &answer, problem);
     if (status == STATUS_OK) {
         snprintf(tag, sizeof tag, "%.72s-%s.%s", row.id, kind->kind.name, format->extension);
         if (!reply_immutable(reply, request, tag)) {
@@ -94,9 +96,7 @@ Status results_solution(App *app, const Request *request, Reply *reply, Problem 
     StudyRequest given = {.study = NULL}, found = {.study = NULL};
     Warnings warnings = {NULL, 0};
     Bytes bytes = {.most = app->reply_most};
-    Status status = db_result_load(app->db, request->parameters[0], &row, problem);
-    if (status == STATUS_OK)
-        status = study_read_kind(&row, study_of_route(request), &answer, problem);
+    Status status = study_load(app, request, study_of_route(request), &row, &answer, problem);
     if (status == STATUS_OK)
         status =
             jobs_prepare(app->db, row.scene, strlen(row.scene), NULL, &given, &warnings, problem);

@@ -136,7 +136,7 @@ static void record_name(const char *path, char name[RECORD_NAME_SIZE]) {
 
 // Adds the ground motion of a file to a database that only this process has.
 static Status record_file_add(Db *db, const char *path, int unit, Problem *problem) {
-    char name[RECORD_NAME_SIZE], digest[RECORD_DIGEST_SIZE];
+    char name[RECORD_NAME_SIZE];
     const GroundMotionOptions options = {.interval = (double)NAN, .unit = unit};
     GroundMotionText motion = {0};
     Bytes text = {0};
@@ -146,21 +146,16 @@ static Status record_file_add(Db *db, const char *path, int unit, Problem *probl
     if (status == STATUS_OK)
         status = ground_motion_text_read(text.at != NULL ? text.at : "", text.count, RECORD_SAMPLES,
                                          &options, &motion, problem);
-    if (status == STATUS_OK) {
-        const RecordLook look = record_look(&motion.samples, motion.interval, 1);
-        record_digest(motion.interval, &motion.samples, digest);
-        const RecordRow row = {.name = name,
-                               .layout = (char *)(uintptr_t)motion.layout,
-                               .unit = (char *)(uintptr_t)acceleration_unit_names[motion.unit],
-                               .interval = motion.interval,
-                               .count = motion.samples.count,
-                               .peak = fmax(look.highest, -look.lowest),
-                               .peak_time = (double)look.peak_at * motion.interval,
-                               .peak_velocity = look.peak_velocity,
-                               .end_velocity = look.end_velocity,
-                               .digest = digest};
+    RecordRow row = {.name = strdup(name),
+                     .layout = motion.layout != NULL ? strdup(motion.layout) : NULL,
+                     .interval = motion.interval};
+    if (status == STATUS_OK &&
+        (row.name == NULL || row.layout == NULL ||
+         record_row_measure(&row, &motion.samples, motion.unit) != STATUS_OK))
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the record");
+    if (status == STATUS_OK)
         status = db_record_add(db, &row, &motion.samples, &is_there, problem);
-    }
+    record_row_clear(&row);
     ground_motion_text_clear(&motion);
     bytes_clear(&text);
     return status;

@@ -2,10 +2,13 @@
 // changes.
 #include "server/db/records.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/excitation/recorded_motion.h"
+#include "core/formats/ground_motion_text.h"
 #include "server/db/db_private.h"
 #include "server/util/sha256.h"
 
@@ -73,6 +76,20 @@ void record_digest(double interval, const Reals *samples, char digest[RECORD_DIG
     sha256_add(taking, &interval, sizeof interval);
     sha256_add(taking, samples->at, samples->count * sizeof *samples->at);
     sha256_end(taking, digest);
+}
+
+Status record_row_measure(RecordRow *row, const Reals *samples, int unit) {
+    const RecordLook look = record_look(samples, row->interval, 1);
+    char digest[RECORD_DIGEST_SIZE];
+    row->count = samples->count;
+    row->peak = fmax(look.highest, -look.lowest);
+    row->peak_time = (double)look.peak_at / (1 / row->interval);
+    row->peak_velocity = look.peak_velocity;
+    row->end_velocity = look.end_velocity;
+    record_digest(row->interval, samples, digest);
+    row->unit = strdup(acceleration_unit_names[unit]);
+    row->digest = digest[0] != '\0' ? strdup(digest) : NULL;
+    return status_made(row->unit != NULL && row->digest != NULL);
 }
 
 static const char no_record[] = "there is no record \"%.64s\"";

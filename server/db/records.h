@@ -37,6 +37,9 @@ bool record_name_is_sound(const char *name);
 // SHA-256 of the interval and the samples as little-endian doubles, in hexadecimal digits; ""
 // without memory.
 void record_digest(double interval, const Reals *samples, char digest[RECORD_DIGEST_SIZE]);
+// Sets what follows from the samples [m/s^2], the interval and the unit that they came in.
+// STATUS_NO_MEMORY.
+Status record_row_measure(RecordRow *row, const Reals *samples, int unit);
 
 // Adds both in one transaction. Where the same record exists already *is_there is set and nothing
 // is written; another one of that name is STATUS_CONFLICT. STATUS_LIMIT where there are

@@ -43,6 +43,8 @@ def test_a_calibration_becomes_a_revision_of_a_material():
         confirmed = daemon.request("POST", proposal["links"]["confirm"], json=proposal["revision"],
                                    headers={"If-Match": asked.headers["etag"]})
         assert confirmed.status == 201, confirmed
+        other = daemon.get(f"/v1/results/{result}/optimum.json")
+        assert other.status == 404 and 'for the study "calibrate", not for "optimize": its answer is calibration.json' in other.json()["detail"], other
         newest = daemon.get("/v1/materials/sponge@2").json()
         assert newest["contact_time_deviation"] == answer["parameters"][1]["standard_error"]
 

@@ -230,7 +230,7 @@ def test_a_job_makes_the_study():
         again = daemon.submit(scene, wait=20).json()
         assert again["cached"] and again["result"] == job["result"]
         reply = daemon.get(base + "/tradeoff.json")
-        assert reply.status == 404 and 'no study "tradeoff"' in reply.json()["detail"]
+        assert reply.status == 404 and 'not for "tradeoff"' in reply.json()["detail"]
         own = program.finished(daemon, alone)
         assert daemon.get(f"/v1/results/{own['result']}/ensemble.csv").status == 404
 
