@@ -466,7 +466,7 @@ static void panel_put_legend(const ChartPanel *panel, bool is_beside, Bytes *byt
 }
 
 static void panel_write(ChartPanel *panel, bool has_legend_beside, Bytes *bytes) {
-    const bool has_values = panel_fit(panel);
+    const bool has_values = panel->has_values;
     const double middle = (panel->left + panel->right) / 2;
     chart_put_text(bytes, panel->left, panel->top - 8, "start", "heading", panel->heading);
     if (has_values) {
@@ -502,6 +502,23 @@ static double chart_place(Chart *chart) {
     return y;
 }
 
+// Panels with one labelled axis have the same range of it.
+static void chart_fit(Chart *chart) {
+    ChartPanel *panels = chart->panels;
+    for (size_t i = 0; i < chart->count; i++) {
+        panels[i].has_values = panel_fit(&panels[i]);
+        if (i > 0 && panels[i - 1].x.is_unlabelled && panels[i - 1].has_values) {
+            panels[i].x.min = fmin(panels[i].x.min, panels[i - 1].x.min);
+            panels[i].x.max = fmax(panels[i].x.max, panels[i - 1].x.max);
+        }
+    }
+    for (size_t i = chart->count; i-- > 1;)
+        if (panels[i - 1].x.is_unlabelled && panels[i].has_values) {
+            panels[i - 1].x.min = panels[i].x.min;
+            panels[i - 1].x.max = panels[i].x.max;
+        }
+}
+
 static void chart_clear(Chart *chart) {
     for (struct ChartBlock *block = chart->blocks, *next; block != NULL; block = next) {
         next = block->next;
@@ -518,6 +535,7 @@ void chart_write(Chart *chart, Bytes *bytes) {
         return;
     }
     const double height = chart_place(chart);
+    chart_fit(chart);
     bytes_format(bytes,
                  "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" "
                  "role=\"img\">\n<title>",

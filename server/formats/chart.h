@@ -25,7 +25,7 @@ typedef struct ChartTick {
 } ChartTick;
 
 typedef struct ChartAxis {
-    const char *title; // NULL: none
+    const char *title; // of x alone, below its labels; NULL: none
     bool is_logarithmic;
     bool is_unlabelled; // the panel below has the labels
     int max_decades;    // logarithmic: shown, from the largest value down; 0: all
@@ -69,6 +69,7 @@ typedef struct ChartPanel {
     ChartSeries series[CHART_SERIES]; // the first in front
     size_t count;
     double left, right, top, bottom; // of the frame, by chart_write
+    bool has_values;                 // likewise: there is something to be drawn
 } ChartPanel;
 
 typedef struct Chart {

@@ -7,17 +7,18 @@
 
 enum { MOTIONS_DRAWN = 3 };
 
-// "POINTER = VALUE (LOW to HIGH) UNIT"
+// "POINTER = VALUE UNIT (LOW to HIGH)"
 static const char *calibration_parameter_text(Chart *chart, const CalibratedParameter *parameter) {
     const Reals *interval = &parameter->interval_95;
     const char *unit = parameter->unit != NULL ? parameter->unit : "";
+    const char *space = unit[0] != '\0' ? " " : "";
     if (isnan(parameter->value))
         return chart_text(chart, "%.80s is unknown", parameter->pointer);
     if (interval->count != 2 || !parameter->is_identifiable)
-        return chart_text(chart, "%.80s = %.4g %s%s", parameter->pointer, parameter->value, unit,
-                          parameter->is_identifiable ? "" : " (not determined)");
-    return chart_text(chart, "%.80s = %.4g (%.4g to %.4g) %s", parameter->pointer, parameter->value,
-                      interval->at[0], interval->at[1], unit);
+        return chart_text(chart, "%.80s = %.4g%s%s%s", parameter->pointer, parameter->value, space,
+                          unit, parameter->is_identifiable ? "" : " (not determined)");
+    return chart_text(chart, "%.80s = %.4g%s%s (%.4g to %.4g)", parameter->pointer,
+                      parameter->value, space, unit, interval->at[0], interval->at[1]);
 }
 
 static size_t calibration_motion_count(const CalibrationMotion *motion) {

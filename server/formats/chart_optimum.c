@@ -88,12 +88,11 @@ static void optimum_add_markers(Chart *chart, ChartPanel *panel, const OptimumCa
 static void optimum_add_history(Chart *chart, const Optimum *optimum) {
     const OptimumCandidates *rows = &optimum->history;
     const bool is_maximum = optimum_is_maximum(optimum, 0);
-    ChartPanel *panel = chart_panel(chart, NULL, 320);
+    ChartPanel *panel = chart_panel(chart, optimum_quantity(chart, optimum, 0), 320);
     double *x = chart_new(chart, rows->count + 1, sizeof *x);
     double *best = chart_new(chart, rows->count + 1, sizeof *best);
     const double *y = optimum_values_of(chart, rows, 0, is_maximum);
     panel->x.title = "candidate";
-    panel->y.title = optimum_quantity(chart, optimum, 0);
     if (x == NULL || best == NULL || y == NULL)
         return;
     for (size_t i = 0; i < rows->count; i++) {
@@ -111,13 +110,12 @@ static void optimum_add_history(Chart *chart, const Optimum *optimum) {
 
 static void optimum_add_front(Chart *chart, const Optimum *optimum) {
     const OptimumCandidates *rows = &optimum->history, *front = &optimum->front;
-    ChartPanel *panel = chart_panel(chart, NULL, 320);
+    ChartPanel *panel = chart_panel(chart, optimum_quantity(chart, optimum, 1), 320);
     double *x = chart_new(chart, front->count + 1, sizeof *x);
     double *y = chart_new(chart, front->count + 1, sizeof *y);
     const double *all_x = optimum_values_of(chart, rows, 0, optimum_is_maximum(optimum, 0));
     const double *all_y = optimum_values_of(chart, rows, 1, optimum_is_maximum(optimum, 1));
     panel->x.title = optimum_quantity(chart, optimum, 0);
-    panel->y.title = optimum_quantity(chart, optimum, 1);
     if (x == NULL || y == NULL || all_x == NULL || all_y == NULL)
         return;
     for (size_t i = 0; i < front->count; i++) {

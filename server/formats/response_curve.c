@@ -92,9 +92,8 @@ static void response_add_sections(Chart *chart, const ResponseCurve *curve, cons
                 y[count++] = curve->points.at[i].section.at[k].at[0];
             }
     ChartPanel *panel = chart_panel(
-        chart, "Displacement at the upward zero crossings, where no period was found", 200);
+        chart, "displacement [m] at the upward zero crossings, where no period was found", 200);
     panel->x.title = axis;
-    panel->y.title = "displacement [m]";
     chart_add(panel, (ChartSeries){CHART_MARKERS, x, y, NULL, count, .colour = 3});
     if (step > 1)
         chart_note(chart, " ",
@@ -140,16 +139,11 @@ void chart_response(const Variant *answer, Bytes *bytes) {
                       {CURVE_DOWN, "stable, down", "unstable, down"},
                       {CHOICE_ABSENT, "stable, continued", "unstable, continued"}};
     const ResponseCurve *curve = (const ResponseCurve *)(const void *)answer;
-    Chart chart = {.width = 720,
-                   .left = 90,
-                   .right = 180,
-                   .title = "Response curve",
-                   .heading = "Peak displacement of the steady motion"};
+    Chart chart = {.width = 720, .left = 90, .right = 180, .title = "Response curve"};
     const char *axis =
         chart_quantity(&chart, curve->pointer != NULL ? curve->pointer : "value", curve->unit);
-    ChartPanel *panel = chart_panel(&chart, NULL, 320);
+    ChartPanel *panel = chart_panel(&chart, "peak displacement of the steady motion [m]", 320);
     panel->x.title = axis;
-    panel->y.title = "peak displacement [m]";
     for (size_t i = 0; i < COUNT(directions); i++) {
         response_add_orbits(&chart, panel, &curve->points, directions[i].direction, true,
                             (ChartSeries){.colour = i, .legend = directions[i].stable});

@@ -102,3 +102,24 @@ test("Errors of the buffers: bands, settled slopes and those that are none, k_b 
   await says(page.getByRole("table", { name: /stiffness and damping/ }), /1\.656 kN\/m ± 20\.1 %/);
   assert.deepEqual(await axe(page), []);
 });
+
+test("Studies that design: the chart, the values found with units, and the way to the scene that has them", async ({ page, daemon, url }) => {
+  const study = { kind: "optimize", max_candidates: 10, objectives: [{ metric: "rms_displacement" }, { metric: "peak_contact_force" }],
+    variables: [{ pointer: "/dampers/0/clearance", from: 0.005, to: 0.03 }, { pointer: "/dampers/0/buffer", values: ["sponge", "aluminium"] }] };
+  const job = await daemon.run("paper_free_sponge", { duration: 2, study }), main = page.getByRole("main");
+  await page.goto(url(`#/results/${job.result}`));
+  await says(main, /Best: clearance 0\.0\d+, buffer (sponge|aluminium)@1\.\s+10 candidates, 12 runs\./);
+  await says(page.getByRole("table", { name: "Gain" }), /RMS displacement\s+[\d.]+ mm\s+[\d.]+ mm\s+[\d.]+ mm/);
+  await says(page.getByRole("table", { name: "Best compromises" }), /clearance 0\.0\d+, buffer \w+@1\s+[\d.]+ mm\s+[\d.]+ N/);
+  await until("the chart", () => page.getByRole("img", { name: /^Chart/ }).evaluate((image) => image.naturalWidth > 0));
+  assert.deepEqual(await axe(page), []);
+  await page.getByRole("link", { name: "Run the scene with these values" }).click();
+  await leads(page, /#\/scene\?s=/);
+  await open(page, daemon, url, "calibrate_free_sponge");
+  await says(page.getByRole("table", { name: "Parameters" }), /Buffer contact time\s+24\.99 ms\s+[\d.]+ µs\s+24\.9 ms to 25\.1 ms\s+yes/);
+  await open(page, daemon, url, "response_sponge");
+  await says(page.getByRole("table", { name: "Points" }), /3 Hz\s+up\s+1\s+2\s+yes\s+4\.954 mm\s+3\.498 mm/);
+  await open(page, daemon, url, "ensemble_inputs");
+  await says(page.getByRole("table", { name: /Shares of the inputs/ }), /Peak contact force\s+buffer\s+0\.\d+\s+0\.\d+ to 0\.\d+/);
+  assert.deepEqual(await axe(page), []);
+});

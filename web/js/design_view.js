@@ -1,47 +1,44 @@
-// Studies that design: optimize, calibrate, response and fragility. The chart that the service draws, and the answer's lists as tables.
+// Studies that design: the chart that the service draws, and the answer's lists as tables.
 import { address, get, token } from "./api.js";
-import { figures, h, table } from "./dom.js";
-import { column, lesson, sceneLink, told } from "./study_bits.js";
-import { number, title } from "./units.js";
+import { h, table } from "./dom.js";
+import { lesson, member, metric, range, sceneLink, text, told, value } from "./study_bits.js";
+import { title, words } from "./units.js";
 
-const DOCUMENTS = { optimize: "optimum", calibrate: "calibration", response: "response", fragility: "fragility" };
+const DOCUMENTS = { optimize: "optimum", calibrate: "calibration" };
 
-const member = ({ pointer }) => title(pointer.slice(1).replaceAll("/", " "));
-const within = (interval) => (interval?.[0] != null ? `${number(interval[0], 4)} to ${number(interval[1], 4)}` : "–");
-const values = (list) => list.map((one) => `${member(one)} ${told(one.value)}`).join(", ");
-const text = (label, cell) => ({ label, cell });
+const place = text("Member", ({ pointer }) => title(member(pointer)));
+const all = (list) => list.map((one) => `${member(one.pointer)} ${told(one.value)}`).join(", ");
+const values = text("Values", (one) => all(one.values));
 
 const parts = {
-  optimize: ({ best, rivals, region, front, candidates, runs }) => [
-    lesson(best ? `Best: ${values(best.values)}.` : "No candidate keeps the constraints.", `${candidates} candidates, ${runs} runs.`),
-    best && figures(best.objectives.map(({ metric, value, interval_95: interval }) =>
-      [title(metric), `${number(value, 5)}${interval?.length ? ` (${within(interval)})` : ""}`])),
-    region.length > 0 && table("Within 2 % of the best", [text("Member", member), column("From", null, ({ low }) => low),
-      column("To", null, ({ high }) => high)], region),
-    rivals.length > 0 && table("Rivals: how much worse, over the same runs", [text("Values", (one) => values(one.values)),
-      column("Difference", null, ({ difference }) => difference), text("95 %", (one) => within(one.interval_95))], rivals),
-    front.length > 0 && table("Neither objective can improve without the other", [text("Values", (one) => values(one.values)),
-      column("First", null, (one) => one.objectives[0]), column("Second", null, (one) => one.objectives[1])], front)],
+  optimize: ({ best, given, undamped, objectives: goals, rivals, region, front, candidates, runs }, units) => [
+    lesson(best ? `Best: ${all(best.values)}.` : "No candidate keeps the constraints.", `${candidates} candidates, ${runs} runs.`),
+    best && table("Objectives", [metric, value("Best", "value"), range("interval_95")], units(best.objectives)),
+    table("Gain", [metric, value("Best", "best"), value("Given", "given"), value("Without dampers", "undamped")],
+      units(Object.entries(given.metrics).filter(([, one]) => one !== null)
+        .map(([name, one]) => ({ metric: name, best: best?.metrics[name], given: one, undamped: undamped.metrics[name] })))),
+    region.length > 0 && table("Within 2 % of the best", [place, value("From", "low"), value("To", "high")], region),
+    rivals.length > 0 && table("Rivals: how much worse", [values, value("Difference", "difference"), range("interval_95")],
+      units(rivals.map((one) => ({ ...one, metric: goals[0].metric })))),
+    front.length > 0 && table("Best compromises", [values, ...units(goals).map((one, k) => value(title(one.metric), k, one.unit))],
+      front.map((one) => ({ ...one, ...one.objectives })))],
   calibrate: ({ parameters, detail, residual_rms: residuals }) => [lesson(detail),
-    table("Parameters", [text("Member", member), column("Value", null, ({ value }) => value),
-      column("Standard error", null, (one) => one.standard_error), text("95 %", (one) => within(one.interval_95)),
+    table("Parameters", [place, value("Value", "value"), value("Standard error", "standard_error"), range("interval_95"),
       text("Identifiable", ({ identifiable }) => (identifiable ? "yes" : "no"))], parameters),
-    residuals && h("p", null, `Residual, rms of each channel: ${residuals.map(({ channel, unit, value }) => `${channel} ${told(value, unit)}`).join(", ")}.`)],
-  response: ({ points }) => [table("Points of the curve", [column("Value", null, ({ value }) => value),
-    text("Direction", ({ direction }) => direction ?? "continuation"), text("Period [cycles]", ({ period }) => period ?? "none found"),
-    text("Impacts a period", (one) => one.impacts_per_period), text("Stable", ({ period, stable }) => (period === null ? "–" : stable ? "yes" : "no")),
-    column("Peak displacement", "m", (one) => one.peak_displacement), column("Without dampers", "m", (one) => one.undamped_peak_displacement)], points)],
-  fragility: ({ limits, curves }) => [lesson(`${curves.length} ground motions.`),
-    table("Limits", [text("Metric", ({ metric }) => title(metric)), column("Limit", null, ({ value }) => value),
-      column("Median", "m/s^2", ({ median }) => median), text("95 %", (one) => within(one.median_interval_95)),
-      column("Dispersion", null, ({ dispersion }) => dispersion), text("95 % ", (one) => within(one.dispersion_interval_95))], limits)],
+    residuals && table("Residuals", [text("Channel", ({ channel }) => words(channel)), value("RMS", "value")], residuals)],
+  response: ({ points, unit }) => [table("Points", [value("Value", "value", unit),
+    text("Direction", ({ direction }) => direction ?? "continuation"), text("Period [cycles]", ({ period }) => period),
+    text("Impacts a period", (one) => one.impacts_per_period), text("Stable", ({ period, stable }) => period && (stable ? "yes" : "no")),
+    value("Peak displacement", "peak_displacement", "m"), value("Without dampers", "undamped_peak_displacement", "m")], points)],
+  fragility: ({ limits }, units) => [table("Limits", [metric, value("Limit", "value"), value("Median", "median", "m/s^2"), range("median_interval_95", "m/s^2"),
+    value("Dispersion", "dispersion", ""), range("dispersion_interval_95", "")], units(limits))],
 };
 
-export function show(host, { path, result: { study } }) {
-  const document = DOCUMENTS[study.kind], chart = address(`${path}/${document}.svg`);
+export function show(host, { path, result: { study, units } }) {
+  const document = DOCUMENTS[study.kind] ?? study.kind, chart = address(`${path}/${document}.svg`);
   if (!token()) // a picture cannot carry one
-    host.append(h("a", { href: chart }, h("img", { src: chart, alt: `Chart of the ${document}; the tables below have its numbers`, class: "chart" })));
-  host.append(...parts[study.kind](study).filter(Boolean));
+    host.append(h("a", { href: chart }, h("img", { src: chart, alt: "Chart; the tables below have its numbers", class: "chart" })));
+  host.append(...parts[study.kind](study, (rows) => rows.map((row) => ({ ...row, unit: units[row.metric] }))).filter(Boolean));
   if (study.best || study.parameters)
     host.append(h("p", null, sceneLink("Run the scene with these values", get(`${path}/${document}/scene`))));
   if (study.warnings?.length) host.append(lesson(...study.warnings.map(({ detail }) => detail)));

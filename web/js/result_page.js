@@ -16,7 +16,7 @@ import { section as take } from "./take_view.js";
 const sections = [summary, series, animation, impacts, spectrum, energy, plan];
 
 const STUDIES = { compare: "Contact models side by side", sensitivity: "What errors of the buffers do",
-  tradeoff: "Error against cost", sweep: "Many points", ensemble: "Many seeds", optimize: "The best values",
+  tradeoff: "Error against cost", sweep: "Many points", ensemble: "Many runs", optimize: "The best values",
   calibrate: "Parameters fitted to a measurement", response: "Response curve", fragility: "Fragility" };
 const DESIGN = ["optimize", "calibrate", "response", "fragility"]; // share a view
 

@@ -30,12 +30,20 @@ export function jobButton(label, make) {
 export const lesson = (...texts) => h("div.notice", null, texts.filter(Boolean).map((text) => h("p", null, text)));
 export const column = (label, unit, value) => ({ label, numeric: true, value, cell: (row) => quantity(value(row), unit) });
 export const between = (low, high, unit) => `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
+// "clearance" of "/dampers/0/clearance".
+export const member = (pointer) => words(pointer.replace(/^\/(dampers\/0\/)?/, "").replaceAll("/", " "));
 export const told = (value, unit) => (typeof value === "number" ? quantity(value, unit)
   : typeof value === "string" ? value : value ? JSON.stringify(value).slice(0, 80) : "–");
 
+// Columns: a text; a member and an interval, perhaps unknown, in this unit or the row's.
+export const text = (label, cell) => ({ label, cell });
+export const metric = text("Number", (row) => title(row.metric));
+export const value = (label, key, unit) => ({ label, numeric: true, cell: (row) => quantity(row[key], unit ?? row.unit) });
+export const range = (key, unit) => text("95 %", (row) => row[key]?.[0] != null ? between(...row[key], unit ?? row.unit) : null);
+
 // Columns for rows {metric, unit, q05, q95, …}: the metric, its value of this name, where 90 of 100 runs are.
-export const spread = (label, name) => [{ label: "Number", value: ({ metric }) => title(metric) },
-  { label, numeric: true, cell: (row) => quantity(row[name], row.unit) },
+export const spread = (label, name) => [metric,
+  value(label, name),
   { label: "5 to 95 %", numeric: true, cell: ({ q05, q95, unit }) => between(q05, q95, unit) }];
 
 // [smallest, largest] of the numbers among values.

@@ -4,7 +4,7 @@ import { get, post, submit } from "./api.js";
 import { button, figures, fill, folded, h, hint, notice, table } from "./dom.js";
 import { heat } from "./heat.js";
 import { plot } from "./plot.js";
-import { jobButton, sceneLink, told } from "./study_bits.js";
+import { jobButton, member, sceneLink, told } from "./study_bits.js";
 import { title, words } from "./units.js";
 
 export const show = (host, { path, result: { study } }) => (study.points <= 100000 ? sweepView(host, `${path}/table.json`)
@@ -26,7 +26,7 @@ export async function sweepView(host, path, job) {
   const metrics = Object.keys(answer.columns).filter((key) => !/^(index|status|\/.*)$/.test(key))
     .map((key) => field(key, answer.columns[key].unit));
   const axes = answer.axes.map(({ pointer, unit, values }, at) => ({ values, texts: values.map((value) => told(value, unit)),
-    ...field(pointer, unit, pointer.replace(/^\/(dampers\/0\/)?/, "").replaceAll("/", " ")),
+    ...field(pointer, unit, member(pointer)),
     step: answer.axes.slice(at + 1).reduce((product, axis) => product * axis.values.length, 1) }));
   const fields = [...axes, ...metrics, field("status")];
   const place = (point) => axes.map((axis) => `${axis.name} ${axis.cell(point)}`).join(", ");
