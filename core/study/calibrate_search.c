@@ -33,10 +33,8 @@ enum {
     WINDOW_SAMPLES = 64, // at least, in the first window
     SCREENED_FIRST = 32, // points for each start in the first window
     SCREENED = 16,       // and in later ones
-    STEPS_FIRST = 15,    // of a start in a window, tried
-    STEPS_LAST = 60,
-    REPEATS = 3,    // of the last window, with new estimates of the noise
-    EXPLORED = 192, // points around the best fit
+    STEPS = 60,          // of a start in a window, tried
+    EXPLORED = 192,      // points around the best fit
     EXPLORATIONS = 6,
     IMPROVED = 5, // of them that are fitted
     HISTORY_MAX = 4096,
@@ -52,18 +50,14 @@ static const double variance_hann = 1.06;
 static const double correlated_bins = 1.94;
 
 static const double window_growth = 1.4142; // of the length of windows
-// Growth of the effect of a parameter from window to window: where the result may be missed, and
-// where it will be.
-static const double sensitive = 2.5, rough = 4;
+static const double rough = 4;              // growth of effects by which valleys are missed
 static const double difference_share = 0.5; // of the deviation of one parameter alone
 static const double difference_first = 1e-5, difference_min = 1e-9, difference_max = 1e-4,
                     difference_chaos = 5e-2;
 static const double correlation_max = 0.95; // of derivatives that are mostly noise
-// A decrease below this part of the variance of the noise ends a fit.
-static const double tolerance_first = 1e-2, tolerance_last = 1e-4;
+// Of the variance of the noise: a decrease below it ends a fit, one above it begins another.
+static const double tolerance = 1e-3, improvement = 1e-2;
 static const double scatter = 2, scatter_max = 0.5; // standard errors; of the range
-static const double same_point = 1e-3;              // starts this close are one
-static const double hopeless = 10;                  // times the least cost: dropped after a window
 static const double predictable = 1 / 3.0; // of the trust horizon: errors have grown 2000 times
 static const double enough = 0.2; // half width of an interval of the window before, of the range
 static const double undetermined = 0.5; // half width of an interval, of the range
@@ -280,16 +274,6 @@ static double calibrate_variance(const CalibrateWork *work, double cost) {
     return cost / (double)freedom;
 }
 
-static bool calibrate_is_last(const CalibrateWork *work) {
-    return work->window + 1 == work->windows;
-}
-
-// The decrease of the cost that matters.
-static double calibrate_tolerance(const CalibrateWork *work, double cost) {
-    return (calibrate_is_last(work) ? tolerance_last : tolerance_first) *
-           calibrate_variance(work, cost);
-}
-
 static int calibrate_compare_starts(const void *a, const void *b) {
     const CalibrateStart *x = a, *y = b;
     if (x->fit.cost != y->fit.cost)
@@ -312,27 +296,6 @@ static void calibrate_sort_starts(CalibrateWork *work) {
     qsort(work->starts, kept, sizeof *work->starts, calibrate_compare_starts);
     while (kept > 0 && !isfinite(work->starts[kept - 1].fit.cost))
         kept--;
-    calibrate_truncate_starts(work, kept);
-}
-
-// Drops starts that have become one, and those that are far from the best.
-static void calibrate_thin_starts(CalibrateWork *work) {
-    size_t kept = 0;
-    for (size_t i = 0; i < work->start_count; i++) {
-        const CalibrateStart start = work->starts[i];
-        bool is_same = false;
-        for (size_t k = 0; k < kept && !is_same; k++) {
-            double distance = 0;
-            for (size_t j = 0; j < work->variables; j++)
-                distance = fmax(distance, fabs(start.fit.at[j] - work->starts[k].fit.at[j]));
-            is_same = distance < same_point;
-        }
-        if (is_same ||
-            (kept >= CALIBRATE_KEPT && start.fit.cost > hopeless * work->starts[0].fit.cost))
-            continue;
-        work->starts[i] = work->starts[kept];
-        work->starts[kept++] = start;
-    }
     calibrate_truncate_starts(work, kept);
 }
 
@@ -399,11 +362,9 @@ static Status calibrate_add_step(CalibrateWork *work, const CalibrateStart *star
 
 // The next step to try, or the end of the fit.
 static void calibrate_plan_step(CalibrateWork *work, CalibrateStart *start) {
-    const size_t max = calibrate_is_last(work) ? STEPS_LAST : STEPS_FIRST;
-    start->state = START_DONE;
-    if (start->steps < max &&
-        least_squares_step(&start->fit, calibrate_tolerance(work, start->fit.cost)))
-        start->state = START_TRY;
+    const double decrease = tolerance * calibrate_variance(work, start->fit.cost);
+    const bool is_next = start->steps < STEPS && least_squares_step(&start->fit, decrease);
+    start->state = is_next ? START_TRY : START_DONE;
 }
 
 // A difference is half of the deviation that noise gives one parameter alone: the derivatives are
@@ -420,20 +381,18 @@ static void calibrate_set_differences(const CalibrateWork *work, CalibrateStart 
 
 // Spectra of motions that cannot be predicted differ from run to run as from the measured one. What
 // that adds to the squares of the derivatives is removed from them.
-static void calibrate_remove_noise(const CalibrateWork *work, CalibrateStart *start) {
+static void calibrate_remove_noise(const CalibrateWork *work, double cost, double *matrix) {
     const size_t n = work->variables;
-    double *matrix = start->fit.equations.matrix;
-    for (size_t i = 0; i < n; i++) {
-        const double step = start->differences[i], sides = work->stage == STAGE_FIT ? 1 : 2;
-        const double noise = 2 * start->fit.cost / (step * step * sides * sides);
-        matrix[i * (n + 1)] = fmax(matrix[i * (n + 1)] - noise, 1e-3 * noise);
+    const double step = difference_chaos * (work->stage == STAGE_FIT ? 1 : 2);
+    const double noise = 2 * cost / (step * step);
+    for (size_t i = 0; i < n * n; i += n + 1)
+        matrix[i] = fmax(matrix[i] - noise, 1e-3 * noise);
+    for (size_t i = 0; i < n * n; i++) {
+        const double max =
+            correlation_max * sqrt(matrix[i / n * (n + 1)] * matrix[i % n * (n + 1)]);
+        if (i % (n + 1) != 0)
+            matrix[i] = fmin(fmax(matrix[i], -max), max);
     }
-    for (size_t i = 0; i < n; i++)
-        for (size_t k = 0; k < n; k++) {
-            const double max = correlation_max * sqrt(matrix[i * (n + 1)] * matrix[k * (n + 1)]);
-            if (i != k)
-                matrix[i * n + k] = fmin(fmax(matrix[i * n + k], -max), max);
-        }
 }
 
 // Of the best point each column is made twice, on both sides.
@@ -450,7 +409,7 @@ static void calibrate_fold_column(CalibrateWork *work, CalibrateStart *start,
     normal_equations_make((const double *const *)work->columns, work->variables, start->residual,
                           work->rows, &start->fit.equations);
     if (work->is_chaotic)
-        calibrate_remove_noise(work, start);
+        calibrate_remove_noise(work, start->fit.cost, start->fit.equations.matrix);
     calibrate_set_differences(work, start);
     if (work->stage == STAGE_FIT)
         calibrate_plan_step(work, start);
@@ -465,7 +424,7 @@ static Status calibrate_fold_point(CalibrateWork *work, const CalibrateRun *run,
     const double before = start->fit.cost;
     const double cost = part->residual != NULL ? calibrate_sum_squares(part->residual, work->rows)
                                                : (double)INFINITY;
-    if (calibrate_is_last(work) && isfinite(cost)) {
+    if (isfinite(cost)) {
         CalibratePoint *point = list_grow(&work->points, sizeof *point);
         TRY(status_made(point != NULL));
         point->cost = cost;
@@ -485,7 +444,7 @@ static Status calibrate_fold_point(CalibrateWork *work, const CalibrateRun *run,
     free(start->residual);
     start->residual = part->residual;
     part->residual = NULL;
-    if (!is_step || before - cost >= calibrate_tolerance(work, cost))
+    if (!is_step || before - cost >= tolerance * calibrate_variance(work, cost))
         start->state = START_DERIVE;
     return calibrate_add_step(work, start);
 }
@@ -528,9 +487,8 @@ static Status calibrate_open(CalibrateWork *work, CalibrateStage stage) {
     return STATUS_OK;
 }
 
-// New estimates of the noise, from the best fit. Returns the largest relative change.
-static double calibrate_estimate_noise(CalibrateWork *work) {
-    double change = 0;
+// New estimates of the noise, from the best fit.
+static void calibrate_estimate_noise(CalibrateWork *work) {
     for (size_t c = 0; c < work->study->measured.count; c++) {
         const MeasuredTarget *target = &work->targets[c];
         const double count = (double)target->values.count;
@@ -541,39 +499,27 @@ static double calibrate_estimate_noise(CalibrateWork *work) {
         const double fitted = (double)work->variables * count / (double)work->rows;
         work->deviations[c] = fmax(target->deviation * sqrt(sum / fmax(count - fitted, 1)),
                                    1e-9 * measured_rms(target->measured));
-        change = fmax(change, fabs(log(work->deviations[c] / target->deviation)));
     }
-    return change;
 }
 
-// Whether the window before is a result on its own, and this one is so much more sensitive that
-// its valleys may have been missed.
+// Whether the window before is a result on its own, and the effect of a parameter has grown by more
+// than `limit` since: valleys of this one may have been missed.
 static bool calibrate_may_return(const CalibrateWork *work, double limit) {
-    if (work->window == 0)
-        return false;
-    const CalibrateResult *before = &work->results[work->window - 1];
-    const CalibrateStart *best = work->starts;
+    const CalibrateResult *before = &work->results[work->window - (work->window > 0)];
+    const LeastSquares *fit = &work->starts[0].fit;
     const size_t n = work->variables;
-    const double variance = calibrate_variance(work, best->fit.cost);
+    const double variance = calibrate_variance(work, fit->cost);
     double covariance[VARIABLES * VARIABLES], growth = 0;
+    if (work->window == 0 || work->fit == CALIBRATE_PSD)
+        return false;
     least_squares_covariance(&before->equations, covariance);
-    for (size_t i = 0; i < work->parameters; i++) {
-        if (!(2 * sqrt(before->variance * covariance[i * n + i]) < enough))
+    for (size_t i = 0; i < n * n; i += n + 1) {
+        if (i < n * work->parameters && !(2 * sqrt(before->variance * covariance[i]) < enough))
             return false;
-        growth = fmax(growth, best->fit.equations.matrix[i * n + i] * before->variance /
-                                  (before->equations.matrix[i * n + i] * variance));
+        growth = fmax(growth, fit->equations.matrix[i] * before->variance /
+                                  (before->equations.matrix[i] * variance));
     }
     return growth > limit * limit;
-}
-
-// Whether the noise of this window is larger than was given, or than that of the window before.
-static bool calibrate_is_worse(const CalibrateWork *work) {
-    if (work->window == 0)
-        return false;
-    const double uncertain =
-        2 / (double)work->rows + 2 / (double)work->results[work->window - 1].rows;
-    return calibrate_variance(work, work->starts[0].fit.cost) >
-           1 + calibrate_quantile_999 * sqrt(uncertain);
 }
 
 // The window before becomes the last one, and begins with its result.
@@ -589,39 +535,6 @@ static Status calibrate_return(CalibrateWork *work) {
         memcpy(work->starts[i].fit.at, result->starts[i], sizeof result->starts[i]);
     }
     return calibrate_open(work, STAGE_FIT);
-}
-
-// Where the motion cannot be predicted to the end of the window, the one before is the last, or
-// the part of the first one that can.
-static Status calibrate_limit(CalibrateWork *work) {
-    work->is_beyond = true;
-    if (work->window > 0)
-        return calibrate_return(work);
-    work->ends[0] = work->limit = predictable * work->starts[0].horizon;
-    work->windows = 1;
-    return calibrate_open(work, STAGE_FIT);
-}
-
-static Status calibrate_open_spectra(CalibrateWork *work) {
-    work->fit = CALIBRATE_PSD;
-    work->is_chaotic = true;
-    work->explorations = 0;
-    work->windows = 1;
-    work->window = 0;
-    work->ends[0] = work->work.simulation->scene.duration;
-    return calibrate_open(work, STAGE_FIT);
-}
-
-// Whether the end of an interval lies outside: the fit is at a bound, and moves beyond it in the
-// linear model by more than two standard errors.
-static bool calibrate_is_pulled(const LeastSquares *fit, const CalibrateAssessment *found,
-                                size_t i) {
-    const size_t n = fit->equations.count;
-    double step = 0;
-    for (size_t k = 0; k < n; k++)
-        step -= found->covariance[i * n + k] * fit->equations.gradient[k];
-    return (fit->at[i] < 1e-9 && step < -2 * found->errors[i]) ||
-           (fit->at[i] > 1 - 1e-9 && step > 2 * found->errors[i]);
 }
 
 // Increase of the cost from the best point in the linear model.
@@ -674,7 +587,6 @@ static void calibrate_assess(CalibrateWork *work) {
     for (size_t i = 0; i < work->parameters; i++) {
         found->reasons[i] = !(t * found->errors[i] < undetermined) ? UNDETERMINED_WIDE
                             : !isnan(found->rivals[i])             ? UNDETERMINED_RIVAL
-                            : calibrate_is_pulled(fit, found, i)   ? UNDETERMINED_BOUND
                                                                    : UNDETERMINED_NOT;
         found->is_determined &= found->reasons[i] == UNDETERMINED_NOT;
     }
@@ -683,52 +595,59 @@ static void calibrate_assess(CalibrateWork *work) {
 // After the fit of a window: the next one, or the covariance of the best point.
 static Status calibrate_end_window(CalibrateWork *work) {
     const CalibrateStart *best = work->starts;
-    const double change = calibrate_estimate_noise(work);
-    const bool is_time = work->fit == CALIBRATE_TIME;
-    calibrate_thin_starts(work);
-    if (is_time && !isnan(best->horizon) && work->limit == 0)
-        return calibrate_limit(work);
-    if (is_time && calibrate_may_return(work, rough))
+    calibrate_estimate_noise(work);
+    if (work->fit == CALIBRATE_TIME && !isnan(best->horizon) && work->limit == 0) {
+        // The motion cannot be predicted to the end of the window: the one before is the last, or
+        // the part of the first one that can.
+        work->is_beyond = true;
+        if (work->window > 0)
+            return calibrate_return(work);
+        work->ends[0] = work->limit = predictable * best->horizon;
+        work->windows = 1;
+        return calibrate_open(work, STAGE_FIT);
+    }
+    if (calibrate_may_return(work, rough))
         return calibrate_return(work);
+    calibrate_truncate_starts(work, CALIBRATE_KEPT);
     CalibrateResult *result = &work->results[work->window];
     *result = (CalibrateResult){.equations = best->fit.equations,
                                 .variance = calibrate_variance(work, best->fit.cost),
-                                .rows = work->rows};
-    for (size_t i = 0; i < work->start_count && i < CALIBRATE_KEPT; i++)
-        memcpy(result->starts[result->start_count++], work->starts[i].fit.at,
-               sizeof result->starts[i]);
-    if (!calibrate_is_last(work)) {
+                                .start_count = work->start_count};
+    for (size_t i = 0; i < work->start_count; i++)
+        memcpy(result->starts[i], work->starts[i].fit.at, sizeof result->starts[i]);
+    if (work->window + 1 < work->windows) {
         calibrate_scatter_starts(work);
         work->window++;
         return calibrate_open(work, STAGE_SCREEN);
     }
-    if (work->study->measured.count > 1 && change > 0.1 && work->repeats++ < REPEATS)
-        return calibrate_open(work, STAGE_FIT);
     work->stage = STAGE_COVARIANCE;
     work->starts[0].state = START_DERIVE;
     return STATUS_OK;
 }
 
-// After the exploration: the result, or another window, or spectra.
+// After the exploration: the result, or the window before, or spectra.
 static Status calibrate_end_search(CalibrateWork *work) {
-    const CalibrateAssessment *found = &work->assessment;
-    const bool is_time = work->fit == CALIBRATE_TIME;
     calibrate_truncate_starts(work, 1);
     calibrate_assess(work);
-    if (is_time && ((calibrate_is_worse(work) && calibrate_may_return(work, sensitive)) ||
-                    (found->is_ambiguous && calibrate_may_return(work, 1))))
+    if (work->assessment.is_ambiguous && calibrate_may_return(work, 1))
         return calibrate_return(work);
-    if (is_time && !found->is_determined && work->is_beyond)
-        return calibrate_open_spectra(work);
-    work->is_over = true;
-    return STATUS_OK;
+    work->is_over =
+        work->assessment.is_determined || !work->is_beyond || work->fit == CALIBRATE_PSD;
+    if (work->is_over)
+        return STATUS_OK;
+    work->fit = CALIBRATE_PSD;
+    work->is_chaotic = true;
+    work->explorations = work->window = 0;
+    work->windows = 1;
+    work->ends[0] = work->work.simulation->scene.duration;
+    return calibrate_open(work, STAGE_FIT);
 }
 
 // Whether a better point than the best fit was found around it.
 static bool calibrate_is_improved(const CalibrateWork *work) {
     const double cost = work->starts[0].fit.cost;
     for (size_t k = 1; k < work->start_count; k++)
-        if (work->starts[k].fit.cost < cost - tolerance_first * calibrate_variance(work, cost))
+        if (work->starts[k].fit.cost < cost - improvement * calibrate_variance(work, cost))
             return work->explorations < EXPLORATIONS;
     return false;
 }

@@ -62,9 +62,8 @@ typedef enum CalibrateStage {
 // Why a parameter is not identifiable.
 typedef enum Undetermined {
     UNDETERMINED_NOT,
-    UNDETERMINED_WIDE,  // its interval is as wide as its range
-    UNDETERMINED_RIVAL, // another start fits as well
-    UNDETERMINED_BOUND  // the best value is beyond its range
+    UNDETERMINED_WIDE, // its interval is as wide as its range
+    UNDETERMINED_RIVAL // another start fits as well
 } Undetermined;
 
 typedef struct CalibrateAssessment {
@@ -91,7 +90,7 @@ typedef struct CalibratePoints {
 typedef struct CalibrateResult {
     NormalEquations equations; // of the best point
     double variance, starts[CALIBRATE_KEPT][CALIBRATE_VARIABLES];
-    size_t start_count, rows;
+    size_t start_count;
 } CalibrateResult;
 
 typedef struct CalibrateWork {
@@ -102,7 +101,7 @@ typedef struct CalibrateWork {
     CalibrateStage stage;
     int fit; // CalibrateFit
     double ends[CALIBRATE_WINDOWS];
-    size_t windows, window, repeats, explorations;
+    size_t windows, window, explorations;
     double limit;    // end of the part that can be fitted [s]; 0: of the record
     bool is_beyond;  // because of its trust horizon
     bool is_chaotic; // spectra are fitted, and the motion cannot be predicted to its end

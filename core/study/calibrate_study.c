@@ -284,12 +284,14 @@ static void calibrate_references(void *request, StudyReferences *references) {
     *references = (StudyReferences){
         .axes = &study->parameters, .axes_place = "/study/parameters", .names = &study->names};
 }
-// Values with their errors, residuals, the verdict in words.
+
+// --- The answer ---
 
 static const char *calibrate_pointer(const CalibrateWork *work, size_t i) {
     return study_axis_pointer(&work->study->parameters.at[i], 0);
 }
 
+// The errors are those of noise: there are none if the model does not explain the motions.
 static Status calibrate_report_parameter(CalibrateWork *work, size_t i, Simulation *scene) {
     const StudyAxis *axis = &work->study->parameters.at[i];
     const CalibrateAssessment *found = &work->assessment;
@@ -304,19 +306,17 @@ static Status calibrate_report_parameter(CalibrateWork *work, size_t i, Simulati
     TRY(text_copy(row != NULL ? row->unit : NULL, &parameter->unit));
     if (work->start_count == 0)
         return STATUS_OK;
-    const double u = work->starts[0].fit.at[i];
-    parameter->value = calibrate_value(axis, u);
+    parameter->value = calibrate_value(axis, work->starts[0].fit.at[i]);
     parameter->is_identifiable = found->reasons[i] == UNDETERMINED_NOT;
-    if (found->reasons[i] == UNDETERMINED_WIDE)
+    if (found->reasons[i] == UNDETERMINED_WIDE || work->answer->verdict == CALIBRATE_NOT_EXPLAINED)
         return STATUS_OK;
     parameter->standard_error =
         found->errors[i] * (calibrate_is_logarithmic(axis)
                                 ? parameter->value * log(axis->to / axis->from)
                                 : axis->to - axis->from);
-    TRY(status_made(reals_allocate(&parameter->interval_95, 2)));
-    parameter->interval_95.at[0] = calibrate_value(axis, found->low[i]);
-    parameter->interval_95.at[1] = calibrate_value(axis, found->high[i]);
-    return STATUS_OK;
+    const double interval[] = {calibrate_value(axis, found->low[i]),
+                               calibrate_value(axis, found->high[i])};
+    return study_copy_reals(interval, 2, &parameter->interval_95);
 }
 
 static double calibrate_correlation(const CalibrateWork *work, size_t i, size_t k) {
@@ -338,42 +338,34 @@ static Status calibrate_report_correlation(CalibrateWork *work) {
 
 static Status calibrate_report_channel(CalibrateWork *work, size_t c) {
     const MeasuredTarget *target = &work->targets[c];
-    const CalibrateStart *best = work->starts;
+    const MeasuredChannel *measured = target->measured;
+    const bool is_spectrum = target->is_spectrum;
     const size_t count = target->values.count;
-    const double *own = best->residual + target->place;
+    const double *own = work->starts[0].residual + target->place;
+    const double unit_size = is_spectrum ? 10 / log(10) : 1; // dB
     CalibrationResidual *residual = list_append(&work->answer->residuals, sizeof *residual);
     CalibrationMotion *motion = list_append(&work->answer->motions, sizeof *motion);
     TRY(status_made(residual != NULL && motion != NULL));
     size_t number;
-    const MeasuredChannel *measured = target->measured;
     const Channel *channel = channel_find(measured->channel, &number);
-    const double decibels = target->is_spectrum ? 10 / log(10) : 1;
-    const char *unit = target->is_spectrum ? "dB" : channel->unit;
     residual->rms =
-        decibels * target->deviation * sqrt(calibrate_sum_squares(own, count) / (double)count);
-    residual->measured_rms = target->is_spectrum ? (double)NAN : measured_rms(measured);
-    residual->deviation =
-        decibels * (target->is_spectrum ? target->deviation : work->deviations[c]);
+        unit_size * target->deviation * sqrt(calibrate_sum_squares(own, count) / (double)count);
+    residual->measured_rms = is_spectrum ? (double)NAN : measured_rms(measured);
+    residual->deviation = unit_size * (is_spectrum ? target->deviation : work->deviations[c]);
     residual->samples = target->samples;
-    motion->is_spectrum = target->is_spectrum;
+    motion->is_spectrum = is_spectrum;
     TRY(text_copy(measured->channel, &residual->channel));
-    TRY(text_copy(unit, &residual->unit));
+    TRY(text_copy(is_spectrum ? "dB" : channel->unit, &residual->unit));
     TRY(text_copy(measured->channel, &motion->channel));
-    TRY(text_copy(target->is_spectrum ? channel->psd_unit : unit, &motion->unit));
-    const size_t stride = (count + MOTION_POINTS - 1) / MOTION_POINTS,
-                 points = (count - 1) / stride + 1;
-    TRY(status_made(reals_allocate(&motion->at, points) &&
-                    reals_allocate(&motion->measured, points) &&
-                    reals_allocate(&motion->fitted, points)));
-    for (size_t k = 0; k < points; k++) {
-        const size_t i = k * stride;
+    TRY(text_copy(is_spectrum ? channel->psd_unit : channel->unit, &motion->unit));
+    const size_t stride = (count + MOTION_POINTS - 1) / MOTION_POINTS;
+    for (size_t i = 0; i < count; i += stride) {
         const double value = target->values.at[i], fitted = value + target->deviation * own[i];
-        motion->at.at[k] =
-            target->is_spectrum
-                ? (double)(i + 1) / ((double)target->welch.segment * measured->interval)
-                : measured_time(measured, target->first + i);
-        motion->measured.at[k] = target->is_spectrum ? exp(value) : value;
-        motion->fitted.at[k] = target->is_spectrum ? exp(fitted) : fitted;
+        const double bin = (double)(i + 1) / ((double)target->welch.segment * measured->interval);
+        TRY(study_add_real(is_spectrum ? bin : measured_time(measured, target->first + i),
+                           &motion->at));
+        TRY(study_add_real(is_spectrum ? exp(value) : value, &motion->measured));
+        TRY(study_add_real(is_spectrum ? exp(fitted) : fitted, &motion->fitted));
     }
     return STATUS_OK;
 }
@@ -393,69 +385,70 @@ static bool calibrate_is_correlated(const double *residual, size_t count) {
            n * (n + 2) * sum > calibrate_chi_square((double)lags, calibrate_quantile_999);
 }
 
-// Whether the model explains the measured motions, and a sentence if not.
-static Status calibrate_check_fit(CalibrateWork *work, bool *is_explained) {
+// The sentence if the model does not explain a channel, whose noise was not given.
+static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
     Calibration *answer = work->answer;
-    const CalibrateStart *best = work->starts;
+    const MeasuredTarget *target = &work->targets[c];
+    const CalibrationResidual *residual = &answer->residuals.at[c];
+    const char *name = residual->channel, *unit = residual->unit;
+    const double rms = residual->rms, motion = residual->measured_rms;
+    // Two estimated spectra, if both are of motions that cannot be predicted.
+    const double misfit = spectrum_misfit * (work->is_chaotic ? sqrt(2) : 1);
+    if (target->is_spectrum)
+        return rms < misfit * residual->deviation
+                   ? STATUS_OK
+                   : status_made(text_format(
+                         &answer->detail,
+                         "the spectrum of %s differs from the best fit by %.2g dB rms, and %.2g "
+                         "dB would be expected of spectra of this length",
+                         name, rms, residual->deviation));
+    if (rms >= motion)
+        return status_made(text_format(&answer->detail,
+                                       "the differences of %s from the best fit, %.2g %s rms, are "
+                                       "as large as the measured motion, %.2g %s rms",
+                                       name, rms, unit, motion, unit));
+    if (!calibrate_is_correlated(work->starts[0].residual + target->place, target->values.count))
+        return STATUS_OK;
+    if (rms >= structured * motion)
+        return status_made(text_format(
+            &answer->detail,
+            "the differences of %s from the best fit, %.2g %s rms or %.2g %% of the motion, are "
+            "correlated in time, which noise is not",
+            name, rms, unit, 100 * rms / motion));
+    return warnings_add(&answer->warnings, json_pointer_at("/study/measured", c).at,
+                        "the differences of %s from the fit, %.2g %s rms, are correlated in time: "
+                        "the true intervals are wider than those given",
+                        name, rms, unit);
+}
+
+// The sentence if the model does not explain the measured motions.
+static Status calibrate_check_fit(CalibrateWork *work) {
+    Calibration *answer = work->answer;
     double chi_square = 0;
     size_t given = 0;
-    *is_explained = true;
-    for (size_t c = 0; c < work->study->measured.count && *is_explained; c++) {
+    for (size_t c = 0; c < work->study->measured.count && answer->detail == NULL; c++) {
         const MeasuredTarget *target = &work->targets[c];
-        const CalibrationResidual *residual = &answer->residuals.at[c];
-        const double *own = best->residual + target->place;
         const size_t count = target->values.count;
-        if (target->is_spectrum) {
-            // Two estimated spectra, if both are of motions that cannot be predicted.
-            *is_explained = residual->rms < spectrum_misfit * residual->deviation *
-                                                (work->is_chaotic ? sqrt(2) : 1);
-            if (!*is_explained)
-                return status_made(text_format(
-                    &answer->detail,
-                    "the spectrum of %s differs from the best fit by %.2g dB rms, and %.2g dB "
-                    "would be expected of spectra of this length",
-                    residual->channel, residual->rms, residual->deviation));
-        } else if (!isnan(target->measured->deviation)) {
-            chi_square += calibrate_sum_squares(own, count);
-            given += count;
-        } else if (residual->rms >= residual->measured_rms) {
-            *is_explained = false;
-            return status_made(text_format(
-                &answer->detail,
-                "the differences of %s from the best fit, %.2g %s rms, are as large as the "
-                "measured motion, %.2g %s rms",
-                residual->channel, residual->rms, residual->unit, residual->measured_rms,
-                residual->unit));
-        } else if (count > 0 && calibrate_is_correlated(own, count)) {
-            *is_explained = residual->rms < structured * residual->measured_rms;
-            if (!*is_explained)
-                return status_made(text_format(
-                    &answer->detail,
-                    "the differences of %s from the best fit, %.2g %s rms or %.2g %% of the "
-                    "motion, are correlated in time, which noise is not",
-                    residual->channel, residual->rms, residual->unit,
-                    100 * residual->rms / residual->measured_rms));
-            TRY(warnings_add(&answer->warnings, json_pointer_at("/study/measured", c).at,
-                             "the differences of %s from the fit, %.2g %s rms, are correlated in "
-                             "time: the true intervals are wider than those given",
-                             residual->channel, residual->rms, residual->unit));
+        if (target->is_spectrum || isnan(target->measured->deviation)) {
+            TRY(calibrate_check_channel_fit(work, c));
+            continue;
         }
+        chi_square += calibrate_sum_squares(work->starts[0].residual + target->place, count);
+        given += count;
     }
     if (given == 0)
         return STATUS_OK;
     answer->chi_square = chi_square;
     answer->freedom = given > work->variables ? given - work->variables : 1;
-    const double freedom = (double)answer->freedom,
-                 limit = calibrate_chi_square(freedom, calibrate_quantile_999);
-    *is_explained = chi_square <= limit;
-    if (!*is_explained)
-        return status_made(text_format(&answer->detail,
-                                       "the differences from the best fit are %.3g times as large "
-                                       "as the given deviation: chi square is %.4g for %.0f "
-                                       "degrees of freedom, noise exceeds %.4g once in a thousand "
-                                       "times",
-                                       sqrt(chi_square / freedom), chi_square, freedom, limit));
-    return STATUS_OK;
+    const double freedom = (double)answer->freedom;
+    const double limit = calibrate_chi_square(freedom, calibrate_quantile_999);
+    if (answer->detail != NULL || chi_square <= limit)
+        return STATUS_OK;
+    return status_made(text_format(
+        &answer->detail,
+        "the differences from the best fit are %.3g times as large as the given deviation: chi "
+        "square is %.4g for %.0f degrees of freedom, noise exceeds %.4g once in a thousand times",
+        sqrt(chi_square / freedom), chi_square, freedom, limit));
 }
 
 // Why a parameter is not identifiable.
@@ -469,21 +462,20 @@ static Status calibrate_explain(CalibrateWork *work, size_t i) {
                                        "%s is not determined: %.4g and %.4g fit equally well",
                                        pointer, calibrate_value(axis, work->starts[0].fit.at[i]),
                                        calibrate_value(axis, found->rivals[i])));
-    if (found->reasons[i] == UNDETERMINED_BOUND)
+    if (work->is_chaotic)
         return status_made(text_format(
-            detail, "%s ends at %.4g, the end of its range: the best value lies beyond, widen it",
-            pointer, calibrate_value(axis, work->starts[0].fit.at[i])));
-    size_t partner = i;
+            detail,
+            "%s is not determined: the motion is chaotic, and its spectrum scatters by %.2g dB "
+            "from run to run, by more than %s changes it; spectra of a longer record scatter less",
+            pointer, sqrt(2) * work->answer->residuals.at[0].deviation, pointer));
     for (size_t k = 0; k < work->parameters; k++)
         if (k != i && found->reasons[k] == UNDETERMINED_WIDE &&
             fabs(calibrate_correlation(work, i, k)) > 0.9)
-            partner = k;
-    if (partner != i)
-        return status_made(text_format(detail,
-                                       "%s and %s are not determined one by one: only a "
-                                       "combination of them is (their correlation is %.4f)",
-                                       pointer, calibrate_pointer(work, partner),
-                                       calibrate_correlation(work, i, partner)));
+            return status_made(text_format(detail,
+                                           "%s and %s are not determined one by one: only a "
+                                           "combination of them is (their correlation is %.4f)",
+                                           pointer, calibrate_pointer(work, k),
+                                           calibrate_correlation(work, i, k)));
     return status_made(
         text_format(detail,
                     isfinite(found->errors[i])
@@ -494,24 +486,13 @@ static Status calibrate_explain(CalibrateWork *work, size_t i) {
 
 static Status calibrate_report_verdict(CalibrateWork *work) {
     Calibration *answer = work->answer;
-    bool is_explained;
-    TRY(calibrate_check_fit(work, &is_explained));
-    if (!is_explained) {
-        answer->verdict = CALIBRATE_NOT_EXPLAINED;
-        // The errors are those of noise, not of the model.
-        for (size_t i = 0; i < work->parameters; i++) {
-            CalibratedParameter *parameter = &answer->parameters.at[i];
-            parameter->standard_error = (double)NAN;
-            free(parameter->interval_95.at);
-            parameter->interval_95 = (Reals){NULL, 0};
-        }
+    TRY(calibrate_check_fit(work));
+    answer->verdict = answer->detail != NULL ? CALIBRATE_NOT_EXPLAINED : CALIBRATE_NOT_IDENTIFIABLE;
+    for (size_t i = 0; i < work->parameters && answer->detail == NULL; i++)
+        if (work->assessment.reasons[i] != UNDETERMINED_NOT)
+            TRY(calibrate_explain(work, i));
+    if (answer->detail != NULL)
         return STATUS_OK;
-    }
-    for (size_t i = 0; i < work->parameters; i++)
-        if (work->assessment.reasons[i] != UNDETERMINED_NOT) {
-            answer->verdict = CALIBRATE_NOT_IDENTIFIABLE;
-            return calibrate_explain(work, i);
-        }
     answer->verdict = CALIBRATE_EXPLAINED;
     const CalibrationResidual *first = &answer->residuals.at[0];
     return status_made(text_format(
@@ -522,44 +503,34 @@ static Status calibrate_report_verdict(CalibrateWork *work) {
 }
 
 static Status calibrate_warn(CalibrateWork *work) {
-    Calibration *answer = work->answer;
-    const CalibrateStart *best = work->starts;
-    if (work->limit > 0 && work->fit == CALIBRATE_TIME)
-        TRY(warnings_add(&answer->warnings, "/study/measured",
-                         "small errors grow too fast to predict the motion beyond about %.3g s: "
-                         "only the samples before were fitted",
-                         work->limit));
-    if (work->limit > 0 && work->fit == CALIBRATE_PSD)
-        TRY(warnings_add(&answer->warnings, "/study/fit",
-                         "small errors grow too fast to predict the motion beyond about %.3g s, "
-                         "which is too short to determine the parameters: spectra were fitted",
-                         work->limit));
-    if (work->study->fit == CALIBRATE_PSD && work->is_chaotic)
-        TRY(warnings_add(&answer->warnings, "/study/fit",
+    Warnings *warnings = &work->answer->warnings;
+    const double *at = work->starts[0].fit.at;
+    if (work->limit > 0)
+        TRY(warnings_add(
+            warnings, "/study/measured",
+            "small errors grow too fast to predict the motion beyond about %.3g s%s", work->limit,
+            work->fit == CALIBRATE_TIME
+                ? ": only the samples before were fitted"
+                : ", which is too short to determine the parameters: spectra were fitted"));
+    else if (work->is_chaotic)
+        TRY(warnings_add(warnings, "/study/fit",
                          "the motion cannot be predicted to the end of the record: its spectrum "
                          "changes with the smallest errors, and the fit is accordingly uncertain"));
-    for (size_t i = 0; i < work->parameters; i++)
-        if (best->fit.at[i] < 1e-9 || best->fit.at[i] > 1 - 1e-9)
-            TRY(warnings_add(&answer->warnings, json_pointer_at("/study/parameters", i).at,
+    for (size_t i = 0; i < work->variables; i++)
+        if (at[i] < 1e-9 || at[i] > 1 - 1e-9)
+            TRY(warnings_add(warnings,
+                             i < work->parameters ? json_pointer_at("/study/parameters", i).at
+                                                  : "/study/max_shift",
                              "the best value, %.4g, is the end of the range: a wider range may fit "
                              "better",
-                             calibrate_value(&work->study->parameters.at[i], best->fit.at[i])));
-    if (work->variables > work->parameters &&
-        fabs(best->fit.at[work->parameters] - 0.5) > 0.5 - 1e-9)
-        TRY(warnings_add(&answer->warnings, "/study/max_shift",
-                         "the fitted shift is the largest allowed one"));
+                             i < work->parameters
+                                 ? calibrate_value(&work->study->parameters.at[i], at[i])
+                                 : calibrate_shift(work, at)));
     return STATUS_OK;
 }
-static Status calibrate_report(CalibrateWork *work) {
+
+static Status calibrate_report_fit(CalibrateWork *work) {
     Calibration *answer = work->answer;
-    const CalibrateStart *best = work->starts;
-    Simulation scene = {0};
-    answer->fit = work->fit;
-    Status status = fields_copy(simulation_fields, work->work.simulation, &scene);
-    for (size_t i = 0; i < work->parameters && status == STATUS_OK; i++)
-        status = calibrate_report_parameter(work, i, &scene);
-    simulation_clear(&scene);
-    TRY(status);
     if (work->start_count == 0) {
         answer->verdict = CALIBRATE_NOT_EXPLAINED;
         return status_made(text_format(&answer->detail, "none of the %llu runs ended: see failures",
@@ -568,7 +539,7 @@ static Status calibrate_report(CalibrateWork *work) {
     TRY(calibrate_report_correlation(work));
     for (size_t c = 0; c < work->study->measured.count; c++)
         TRY(calibrate_report_channel(work, c));
-    answer->shift = calibrate_shift(work, best->fit.at);
+    answer->shift = calibrate_shift(work, work->starts[0].fit.at);
     if (work->variables > work->parameters)
         answer->shift_error =
             work->assessment.errors[work->parameters] * 2 * work->study->max_shift;
@@ -577,9 +548,18 @@ static Status calibrate_report(CalibrateWork *work) {
 }
 
 static Status calibrate_end(void *of, const StudyTools *tools, Problem *problem) {
+    CalibrateWork *work = of;
+    Simulation scene = {0};
     (void)tools;
     (void)problem;
-    return calibrate_report(of);
+    work->answer->fit = work->fit;
+    Status status = calibrate_report_fit(work);
+    if (status == STATUS_OK)
+        status = fields_copy(simulation_fields, work->work.simulation, &scene);
+    for (size_t i = 0; i < work->parameters && status == STATUS_OK; i++)
+        status = calibrate_report_parameter(work, i, &scene);
+    simulation_clear(&scene);
+    return status;
 }
 
 static Status calibrate_solution(const void *request, const Variant *answer, StudyValue *values,
