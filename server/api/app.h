@@ -89,10 +89,9 @@ Status study_load(App *app, const Request *request, const StudyKind *kind, Resul
 
 // --- tables of numbers, columns.c ---
 
-// The format of the extension in the path's `parameter`, else by Accept. `has_chart`: SVG is one of
-// the formats.
-Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
-                      const TableFormat **format, Problem *problem);
+// The format of the extension in the path's `parameter`, else by Accept; `offered` ends with NULL.
+Status columns_format(const Request *request, size_t parameter, const TableFormat *const *offered,
+                      Reply *reply, const TableFormat **format, Problem *problem);
 // "?from=&to=" [s]: which of `count` samples, at least one, are written. "?points=n": smallest and
 // largest values in at most n buckets. STATUS_USAGE: not numbers, or no sample is there.
 Status columns_window(const Request *request, size_t count, TableStream *stream, Problem *problem);

@@ -15,18 +15,12 @@ static const double wait_max = 60; // [s]
 
 // --- parts of a reply ---
 
-Status columns_format(const Request *request, size_t parameter, bool has_chart, Reply *reply,
-                      const TableFormat **format, Problem *problem) {
-    const TableFormat *offered[REPLY_FORMATS_MAX];
+Status columns_format(const Request *request, size_t parameter, const TableFormat *const *offered,
+                      Reply *reply, const TableFormat **format, Problem *problem) {
     ReplyFormat formats[REPLY_FORMATS_MAX];
     size_t count = 0, choice;
-    for (size_t i = 0; table_formats[i] != NULL && count < REPLY_FORMATS_MAX; i++) {
-        if (table_formats[i] == &format_svg && !has_chart)
-            continue;
-        offered[count] = table_formats[i];
-        formats[count++] =
-            (ReplyFormat){table_formats[i]->extension, table_formats[i]->content_type};
-    }
+    for (; offered[count] != NULL && count < REPLY_FORMATS_MAX; count++)
+        formats[count] = (ReplyFormat){offered[count]->extension, offered[count]->content_type};
     TRY(reply_format(request, parameter, formats, count, reply, &choice, problem));
     *format = offered[choice];
     return STATUS_OK;
@@ -232,7 +226,8 @@ Status results_part(App *app, const Request *request, Reply *reply, Problem *pro
     while (strncmp(part->name, name, strlen(part->name)) != 0)
         part++;
     const bool is_series = part == &parts[0];
-    TRY(columns_format(request, 1, part->has_chart, reply, &format, problem));
+    TRY(columns_format(request, 1, part->has_chart ? table_formats : table_formats_without_chart,
+                       reply, &format, problem));
     snprintf(tag, sizeof tag, "%.72s-%s.%s", id, part->name, format->extension);
     if (is_series) {
         // Nothing is computed again for a client that has it.

@@ -127,7 +127,7 @@ static Status force_reply(App *app, const Request *request, Reply *reply, void *
                           Problem *problem) {
     ForceRun *force = context;
     const TableFormat *format = NULL;
-    TRY(columns_format(request, 2, false, reply, &format, problem));
+    TRY(columns_format(request, 2, table_formats_without_chart, reply, &format, problem));
     if (force_is_cached(request, reply, force, format))
         return STATUS_OK;
     if (force->status != STATUS_OK)
@@ -150,7 +150,7 @@ Status results_force(App *app, const Request *request, Reply *reply, Problem *pr
                                    "to run the scene again takes longer than 60 s: submit a "
                                    "shorter scene that holds the impact"};
     const TableFormat *format = NULL;
-    TRY(columns_format(request, 2, false, reply, &format, problem));
+    TRY(columns_format(request, 2, table_formats_without_chart, reply, &format, problem));
     if (request->kept != NULL)
         return request_run_resume(app, request, reply, &run, problem);
     ForceRun *force = calloc(1, sizeof *force);

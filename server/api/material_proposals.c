@@ -164,10 +164,10 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
     const char *slug = request->parameters[0];
     MaterialState state;
     MaterialRevision before;
-    const ReplyFormat formats[] = {{"json", type_json}, {"svg", format_svg.content_type}};
-    size_t format;
+    static const TableFormat *const formats[] = {&format_json, &format_svg, NULL};
+    const TableFormat *format;
     int separation;
-    TRY(reply_format(request, 1, formats, COUNT(formats), reply, &format, problem));
+    TRY(columns_format(request, 1, formats, reply, &format, problem));
     TRY(db_material_state(app->db, slug, &state, problem));
     TRY(measurement_separation(app, request, &separation, problem));
     TRY(material_latest(app, slug, &before, problem));
@@ -176,8 +176,8 @@ Status proposals_show(App *app, const Request *request, Reply *reply, Problem *p
                         ? selection_read(selection, request, &state, problem)
                         : problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurements");
     if (status == STATUS_OK && !material_is_cached(request, reply, &state))
-        status = proposal_run(app, request, &before.material, selection, separation, format == 1,
-                              reply, problem);
+        status = proposal_run(app, request, &before.material, selection, separation,
+                              format == &format_svg, reply, problem);
     selection_free(selection);
     material_revision_clear(&before);
     return status;

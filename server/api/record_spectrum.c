@@ -102,54 +102,45 @@ static Status spectrum_put_csv(const SpectrumRun *spectrum, Bytes *bytes, Proble
     return format_write(&format_csv, &table, bytes, problem);
 }
 
-enum { SPECTRUM_JSON, SPECTRUM_CSV, SPECTRUM_SVG };
-
-static Status spectrum_format(const Request *request, Reply *reply, size_t *choice,
-                              Problem *problem) {
-    const ReplyFormat formats[] = {[SPECTRUM_JSON] = {"json", format_json.content_type},
-                                   [SPECTRUM_CSV] = {"csv", format_csv.content_type},
-                                   [SPECTRUM_SVG] = {"svg", format_svg.content_type}};
-    return reply_format(request, 1, formats, COUNT(formats), reply, choice, problem);
-}
+static const TableFormat *const spectrum_formats[] = {&format_json, &format_csv, &format_svg, NULL};
 
 // Sets the tag. True: the client has it.
 static bool spectrum_is_cached(const Request *request, Reply *reply, const SpectrumRun *spectrum,
-                               size_t format) {
+                               const TableFormat *format) {
     char tag[112];
     const Column *period = spectrum->columns.at;
     const size_t count = spectrum->columns.rows;
-    snprintf(tag, sizeof tag, "%.16s-%.17g-%.17g-%.17g-%zu-%zu", spectrum->named->digest,
-             spectrum->damping_ratio, period->values[0], period->values[count - 1], count, format);
+    snprintf(tag, sizeof tag, "%.16s-%.17g-%.17g-%.17g-%zu-%s", spectrum->named->digest,
+             spectrum->damping_ratio, period->values[0], period->values[count - 1], count,
+             format->extension);
     return reply_tagged(reply, request, tag);
 }
 
 static Status spectrum_reply(App *app, const Request *request, Reply *reply, void *context,
                              Problem *problem) {
     SpectrumRun *spectrum = context;
-    const char *const types[] = {format_json.content_type, format_csv.content_type,
-                                 format_svg.content_type};
-    size_t format;
+    const TableFormat *format;
     Bytes bytes = {.most = app->reply_most};
-    TRY(spectrum_format(request, reply, &format, problem));
+    TRY(columns_format(request, 1, spectrum_formats, reply, &format, problem));
     if (spectrum->status != STATUS_OK)
         return problem_set(problem, spectrum->status, "the spectrum was stopped");
     if (spectrum_is_cached(request, reply, spectrum, format))
         return STATUS_OK;
-    if (format == SPECTRUM_JSON)
+    if (format == &format_json)
         spectrum_put_json(spectrum, &bytes);
-    else if (format == SPECTRUM_SVG)
+    else if (format == &format_svg)
         chart_response_spectrum(spectrum->named->name, spectrum->damping_ratio, &spectrum->columns,
                                 &bytes);
     else
         TRY(spectrum_put_csv(spectrum, &bytes, problem));
-    return reply_bytes(reply, 200, types[format], &bytes, problem);
+    return reply_bytes(reply, 200, format->content_type, &bytes, problem);
 }
 
 Status records_spectrum(App *app, const Request *request, Reply *reply, Problem *problem) {
     static const RequestRun run = {spectrum_run, spectrum_free, spectrum_reply,
                                    "the spectrum takes longer than expected: ask for fewer points"};
-    size_t format;
-    TRY(spectrum_format(request, reply, &format, problem));
+    const TableFormat *format;
+    TRY(columns_format(request, 1, spectrum_formats, reply, &format, problem));
     if (request->kept != NULL)
         return request_run_resume(app, request, reply, &run, problem);
     SpectrumRun *spectrum = calloc(1, sizeof *spectrum);

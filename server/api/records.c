@@ -381,7 +381,7 @@ Status records_samples(App *app, const Request *request, Reply *reply, Problem *
     const TableFormat *format = NULL;
     NamedRecord *named;
     char tag[96];
-    TRY(columns_format(request, 1, false, reply, &format, problem));
+    TRY(columns_format(request, 1, table_formats_without_chart, reply, &format, problem));
     TRY(db_record_named(app->db, request->parameters[0], &named, problem));
     snprintf(tag, sizeof tag, "%.64s-%.8s", named->digest, format->extension);
     TableStream *stream = table_stream_new(NULL);

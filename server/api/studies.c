@@ -30,19 +30,6 @@ Status study_load(App *app, const Request *request, const StudyKind *kind, Resul
                              own->kind.name, kind->kind.name, study_document_name(own));
 }
 
-// The format by the extension in the request's second parameter, else by Accept.
-static Status study_format(const Request *request, const StudyKind *kind, Reply *reply,
-                           const TableFormat **format, Problem *problem) {
-    const TableFormat *const *offered = study_formats(kind->answer);
-    ReplyFormat formats[STUDY_FORMATS_MAX];
-    size_t count = 0, choice;
-    for (; offered[count] != NULL; count++)
-        formats[count] = (ReplyFormat){offered[count]->extension, offered[count]->content_type};
-    TRY(reply_format(request, 1, formats, count, reply, &choice, problem));
-    *format = offered[choice];
-    return STATUS_OK;
-}
-
 // The name of the kind's document follows the result in the path.
 static const StudyKind *study_of_route(const Request *request) {
     const char *name = strstr(request->route->pattern, "{id}/") + 5;
@@ -57,7 +44,7 @@ static const StudyKind *study_of_route(const Request *request) {
 Status results_study(App *app, const Request *request, Reply *reply, Problem *problem) {
     const StudyKind *kind = study_of_route(request);
     const TableFormat *format;
-    TRY(study_format(request, kind, reply, &format, problem));
+    TRY(columns_format(request, 1, study_formats(kind->answer), reply, &format, problem));
     ResultRow row = {0};
     StudyAnswer answer = {NULL};
     Bytes bytes = {.most = app->reply_most};
@@ -183,7 +170,7 @@ static Status sweep_reply_chart(App *app, Reply *reply, const TableFormat *forma
 
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {
     const TableFormat *format;
-    TRY(study_format(request, &study_sweep, reply, &format, problem));
+    TRY(columns_format(request, 1, study_formats(study_sweep.answer), reply, &format, problem));
     SweepReply *sent = calloc(1, sizeof *sent);
     if (sent == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the table");

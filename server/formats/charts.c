@@ -701,11 +701,6 @@ void chart_evaluation(const Evaluation *evaluation, const char *slug, Bytes *byt
     chart_write(&chart, bytes);
 }
 
-// --- series and spectra ---
-
-enum { SVG_POINTS = 800 }; // of a line over time
-
-// The columns of one line: the same one twice, or the minima and the maxima of buckets.
 // --- response spectrum ---
 
 void chart_response_spectrum(const char *record, double damping_ratio, const Columns *columns,
@@ -726,6 +721,11 @@ void chart_response_spectrum(const char *record, double damping_ratio, const Col
     chart_write(&chart, bytes);
 }
 
+// --- series and spectra ---
+
+enum { SVG_POINTS = 800 }; // of a line over time
+
+// The columns of one line: the same one twice, or the minima and the maxima of buckets.
 static const Column *svg_column(const Table *table, size_t line, bool is_high) {
     return table->columns[table->bucket > 0 ? 2 * line + is_high : line];
 }

@@ -140,7 +140,8 @@ enum {
 // NPY: float64 of shape (rows, axis and columns). NPZ: an NPY for each. MAT: MATLAB's level 5, a
 // vector for each. SVG: a chart.
 extern const TableFormat format_json, format_csv, format_npy, format_npz, format_mat, format_svg;
-extern const TableFormat *const table_formats[];       // NULL-terminated; json first
+// NULL-terminated; json first.
+extern const TableFormat *const table_formats[], *const table_formats_without_chart[];
 const TableFormat *format_find(const char *extension); // NULL if there is none
 
 // Appends the whole document. STATUS_LIMIT where the format cannot hold it; a limit of `bytes` is

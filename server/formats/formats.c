@@ -7,6 +7,10 @@ const TableFormat *const table_formats[] = {
     &format_json, &format_csv, &format_npy, &format_npz, &format_mat, &format_svg, NULL,
 };
 
+const TableFormat *const table_formats_without_chart[] = {
+    &format_json, &format_csv, &format_npy, &format_npz, &format_mat, NULL,
+};
+
 const TableFormat *format_find(const char *extension) {
     for (size_t i = 0; table_formats[i] != NULL; i++)
         if (strcmp(table_formats[i]->extension, extension) == 0)

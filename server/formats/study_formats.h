@@ -8,8 +8,6 @@
 #include "server/formats/format.h"
 #include "server/jobs/documents.h"
 
-enum { STUDY_FORMATS_MAX = 6 };
-
 // All formats of an answer of this kind, json first; NULL-terminated.
 const TableFormat *const *study_formats(const Kind *kind);
 // NULL if there is none of this extension.

@@ -390,14 +390,20 @@ static StudyReferences request_references(const StudyRequest *request) {
     return references;
 }
 
-// The lists of records that a study keeps: of its axes, and its suite.
-enum { PINNED_LISTS = 2 };
-static PinnedRecords *references_records(const StudyReferences *references, size_t list,
-                                         const char **place) {
-    *place = list == 0 ? "/study/records" : references->suite_place;
-    return list > 0                    ? references->suite
-           : references->names != NULL ? &references->names->records
-                                       : NULL;
+// Record i of those that a study keeps, of its axes and then its suite, with its place; NULL: no
+// more.
+static PinnedRecord *references_record(const StudyReferences *references, size_t i,
+                                       JsonPointer *place) {
+    const PinnedRecords *suite = references->suite;
+    const size_t own = references->names != NULL ? references->names->records.count : 0;
+    if (i < own) {
+        *place = json_pointer_at("/study/records", i);
+        return &references->names->records.at[i];
+    }
+    if (suite == NULL || i - own >= suite->count)
+        return NULL;
+    *place = json_pointer_at(references->suite_place, i - own);
+    return &suite->at[i - own];
 }
 
 // The scene's record, whose digest is set if it is not there.
@@ -545,16 +551,14 @@ static Status names_resolve_axis(NameResolver *names, size_t index) {
 }
 
 // The records that came with the study.
-static Status names_resolve_records(NameResolver *names, size_t list) {
-    const char *place;
-    const PinnedRecords *records = references_records(&names->references, list, &place);
+static Status names_resolve_records(NameResolver *names) {
     Status status = STATUS_OK;
-    for (size_t i = 0; records != NULL && i < records->count; i++) {
-        PinnedRecord *kept = &records->at[i];
-        const JsonPointer own = json_pointer_at(place, i);
-        Status one = resolve_kept_record(names->db, kept, own.at, names->problem);
+    JsonPointer place;
+    PinnedRecord *kept;
+    for (size_t i = 0; (kept = references_record(&names->references, i, &place)) != NULL; i++) {
+        Status one = resolve_kept_record(names->db, kept, place.at, names->problem);
         if (one == STATUS_OK && kept->named != NULL)
-            one = names_add_samples(names, kept->named, own.at);
+            one = names_add_samples(names, kept->named, place.at);
         if (!resolve_continues(one, &status))
             break;
     }
@@ -575,9 +579,8 @@ static Status names_resolve(NameResolver *names, const Dampers *dampers) {
     for (size_t i = 0; materials != NULL && i < 3 * dampers->count; i++)
         if (dampers_buffer(dampers, i)->material != NULL)
             TRY(names_keep_material(names, dampers_buffer(dampers, i)));
-    for (size_t list = 0; list < PINNED_LISTS; list++)
-        if (!resolve_continues(names_resolve_records(names, list), &status))
-            return status;
+    if (!resolve_continues(names_resolve_records(names), &status))
+        return status;
     for (size_t i = 0; references->axes != NULL && i < references->axes->count; i++)
         if (!resolve_continues(names_resolve_axis(names, i), &status))
             return status;
@@ -614,31 +617,25 @@ static Status study_resolve(Db *db, StudyRequest *request, const SimulationLimit
 void request_drop_records(StudyRequest *request) {
     ExcitationRecord *record = request_record(request);
     const StudyReferences references = request_references(request);
-    const char *place;
+    JsonPointer place;
+    PinnedRecord *kept;
     if (record != NULL) {
         refcount_unref(record->named);
         record->named = NULL;
     }
-    for (size_t list = 0; list < PINNED_LISTS; list++) {
-        const PinnedRecords *records = references_records(&references, list, &place);
-        for (size_t i = 0; records != NULL && i < records->count; i++) {
-            refcount_unref(records->at[i].named);
-            records->at[i].named = NULL;
-        }
+    for (size_t i = 0; (kept = references_record(&references, i, &place)) != NULL; i++) {
+        refcount_unref(kept->named);
+        kept->named = NULL;
     }
 }
 
 Status request_load_records(Db *db, StudyRequest *request, Problem *problem) {
     const StudyReferences references = request_references(request);
-    const char *place;
+    JsonPointer place;
+    PinnedRecord *kept;
     Status status = resolve_record(db, request, problem);
-    for (size_t list = 0; list < PINNED_LISTS; list++) {
-        const PinnedRecords *records = references_records(&references, list, &place);
-        for (size_t i = 0; records != NULL && i < records->count; i++)
-            (void)resolve_continues(
-                resolve_kept_record(db, &records->at[i], json_pointer_at(place, i).at, problem),
-                &status);
-    }
+    for (size_t i = 0; (kept = references_record(&references, i, &place)) != NULL; i++)
+        (void)resolve_continues(resolve_kept_record(db, kept, place.at, problem), &status);
     return status;
 }
 
@@ -665,16 +662,14 @@ void references_write(Bytes *lines, const StudyRequest *request, bool has_materi
     const Dampers *dampers = &request->simulation.scene.dampers;
     const ExcitationRecord *record = request_record(request);
     const StudyReferences references = request_references(request);
-    const char *place;
+    JsonPointer place;
+    const PinnedRecord *kept;
     for (size_t i = 0; has_materials && i < 3 * dampers->count; i++)
         references_add(lines, dampers_buffer(dampers, i)->material);
     if (record != NULL)
         references_add_record(lines, record->name);
-    for (size_t list = 0; list < PINNED_LISTS; list++) {
-        const PinnedRecords *records = references_records(&references, list, &place);
-        for (size_t i = 0; records != NULL && i < records->count; i++)
-            references_add_record(lines, records->at[i].name);
-    }
+    for (size_t i = 0; (kept = references_record(&references, i, &place)) != NULL; i++)
+        references_add_record(lines, kept->name);
     const Buffers *materials = references.names != NULL ? &references.names->materials : NULL;
     for (size_t i = 0; has_materials && materials != NULL && i < materials->count; i++)
         references_add(lines, materials->at[i].material);
