@@ -52,6 +52,12 @@ const Field study_names_fields[] = {
     FIELD_LIST(StudyNames, records, pinned_record_fields, 0, PRESENCE_OPTIONAL, "ground motions that the axes name, at submission; filled in if absent"),
     FIELD_END
 };
+
+const Field study_member_fields[] = {
+    FIELD_TEXT(StudyMember, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member, the first one of tied members"),
+    FIELD_TEXTS(StudyMember, pointers, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "all tied members, if there are several"),
+    FIELD_END
+};
 // clang-format on
 
 size_t study_axis_pointer_count(const StudyAxis *axis) {
@@ -60,6 +66,12 @@ size_t study_axis_pointer_count(const StudyAxis *axis) {
 
 const char *study_axis_pointer(const StudyAxis *axis, size_t index) {
     return axis->pointer != NULL ? axis->pointer : axis->pointers.at[index];
+}
+
+Status study_axis_member(const StudyAxis *axis, StudyMember *member) {
+    for (size_t i = 0; i < axis->pointers.count && axis->pointers.count > 1; i++)
+        TRY(texts_append(&member->pointers, axis->pointers.at[i]));
+    return text_copy(study_axis_pointer(axis, 0), &member->pointer);
 }
 
 bool study_axis_is_range(const StudyAxis *axis) {

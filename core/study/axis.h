@@ -65,6 +65,16 @@ typedef struct StudyValue {
     double number;
 } StudyValue;
 
+// The members of an axis, as answers name them.
+typedef struct StudyMember {
+    char *pointer;  // the first of its pointers
+    Texts pointers; // if it has several
+} StudyMember;
+extern const Field study_member_fields[];
+
+// STATUS_NO_MEMORY.
+Status study_axis_member(const StudyAxis *axis, StudyMember *member);
+
 size_t study_axis_pointer_count(const StudyAxis *axis);
 const char *study_axis_pointer(const StudyAxis *axis, size_t index); // from 0
 // The place of one of the pointers of the axis at `place`.

@@ -29,12 +29,12 @@ enum {
     COST_SAMPLES = 16,
     GROUPS_BEFORE = 2, // given and undamped
     RIVALS = 5,
-    UNKNOWN = STATUS_COUNT, // reason of a failure: a metric that no run has
 };
 
 static const double region_tolerance = 0.02, rival_distance = 0.1;
 
 static const char *const optimize_goal_names[] = {"minimize", "maximize", NULL};
+static const char *const optimize_statistic_names[] = {"mean", "max", "quantile", NULL};
 
 // clang-format off
 static const Field optimize_objective_fields[] = {
@@ -51,15 +51,15 @@ static const Field optimize_constraint_fields[] = {
 };
 
 static const Field optimize_over_fields[] = {
-    FIELD_COUNT(OptimizeOver, runs, NULL, WITHIN(1, RUNS_MAX), OPTIONAL, "runs of each candidate, each with its own seed of a random base"),
+    FIELD_COUNT(OptimizeOver, runs, NULL, WITHIN(0, RUNS_MAX), 0, "runs of each candidate, each with its own seed of a random base; 0: one for each record"),
     FIELD_COUNT(OptimizeOver, first_seed, NULL, WITHIN(0, 0x1p53 - 1), OPTIONAL, "the seeds are this one and those that follow it; the excitation's own if absent"),
     FIELD_LIST_OR_NAMES(OptimizeOver, records, pinned_record_fields, "name", RECORDS_MAX, PRESENCE_OPTIONAL, "in place of seeds: uploaded ground motions, one for each run"),
     FIELD_END
 };
 
 static const Field optimize_statistic_fields[] = {
-    FIELD_TEXT(OptimizeStatistic, of, 8, PRESENCE_OPTIONAL, 0, "mean or max"),
-    FIELD_REAL(OptimizeStatistic, quantile, NULL, WITHIN(0, 1), OPTIONAL, "this share of the runs is below"),
+    FIELD_CHOICE(OptimizeStatistic, of, optimize_statistic_names, OPTIMIZE_QUANTILE, "mean, largest value or a quantile"),
+    FIELD_REAL(OptimizeStatistic, quantile, NULL, WITHIN(0, 1), OPTIONAL, "this share of the runs is below it"),
     FIELD_END
 };
 
@@ -76,7 +76,7 @@ static const Field optimize_study_fields[] = {
 };
 
 static const Field optimum_value_fields[] = {
-    FIELD_TEXT(OptimumValue, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member, the first one of tied members"),
+    FIELD_BASE(OptimumValue, member, study_member_fields),
     FIELD_TEXT(OptimumValue, value, 0, PRESENCE_OPTIONAL, FIELD_SCALARS, "its value"),
     FIELD_END
 };
@@ -102,8 +102,8 @@ static const Field optimum_scene_fields[] = {
 };
 
 static const Field optimum_interval_fields[] = {
-    FIELD_TEXT(OptimumInterval, pointer, 0, PRESENCE_OPTIONAL, 0, "of the variable"),
-    FIELD_REAL(OptimumInterval, low, NULL, ANY, OPTIONAL, "smallest value; null of a choice without order"),
+    FIELD_BASE(OptimumInterval, member, study_member_fields),
+    FIELD_REAL(OptimumInterval, low, NULL, ANY, OPTIONAL, "smallest value; null of a choice without order, which is that of the best"),
     FIELD_REAL(OptimumInterval, high, NULL, ANY, OPTIONAL, "largest value"),
     FIELD_END
 };
@@ -123,34 +123,23 @@ const Field optimum_candidate_fields[] = {
     FIELD_END
 };
 
-static const Field optimum_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
-    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them: the runs of the given scene, of that without dampers, then of each candidate"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
-    FIELD_END
-};
-
 static const Field optimum_answer_fields[] = {
     FIELD_COUNT(Optimum, candidates, NULL, AT_MIN(0), 0, "candidates evaluated"),
-    FIELD_COUNT(Optimum, runs, NULL, AT_MIN(0), 0, "runs made"),
-    FIELD_COUNT(Optimum, failed, NULL, AT_MIN(0), 0, "runs that failed; their candidates are infeasible"),
+    FIELD_BASE(Optimum, made, study_runs_fields),
     FIELD_LIST(Optimum, objectives, optimize_objective_fields, 0, PRESENCE_DEFAULT, "as requested, in the order of the candidates' values"),
     FIELD_ITEM_OR_NULL(Optimum, best, optimum_best_fields, PRESENCE_OPTIONAL, "the best feasible candidate, of two objectives the best compromise; null: none is feasible"),
     FIELD_ITEM(Optimum, given, optimum_scene_fields, NULL, PRESENCE_DEFAULT, "the scene as it is"),
     FIELD_ITEM(Optimum, undamped, optimum_scene_fields, NULL, PRESENCE_DEFAULT, "the same scene without its dampers"),
-    FIELD_LIST(Optimum, region, optimum_interval_fields, 0, PRESENCE_DEFAULT, "where each variable alone may be: the objective is within 2 % of the best and the constraints hold, as the search's model of all candidates predicts"),
+    FIELD_LIST(Optimum, region, optimum_interval_fields, 0, PRESENCE_DEFAULT, "a box around the best whose ends are values of candidates: every candidate of the history within all of its intervals keeps the constraints and has an objective within 2 % of the best; equally good candidates beyond worse ones are outside"),
     FIELD_LIST(Optimum, rivals, optimum_rival_fields, 0, PRESENCE_DEFAULT, "the next best candidates whose values differ clearly"),
     FIELD_LIST(Optimum, front, optimum_candidate_fields, 0, PRESENCE_DEFAULT, "of two objectives: candidates that no other beats in both, by the first"),
     FIELD_LIST(Optimum, history, optimum_candidate_fields, 0, PRESENCE_DEFAULT, "every candidate, in their order"),
-    FIELD_LIST(Optimum, failures, optimum_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
-    FIELD_LIST(Optimum, warnings, warning_fields, 0, PRESENCE_DEFAULT, "what is doubtful"),
     FIELD_END
 };
 // clang-format on
 
 static bool optimize_has_seeds(const OptimizeStudy *study) {
-    return study->over.runs != COUNT_ABSENT;
+    return study->over.runs != COUNT_ABSENT && study->over.runs > 0;
 }
 
 static size_t optimize_runs(const OptimizeStudy *study) {
@@ -159,13 +148,10 @@ static size_t optimize_runs(const OptimizeStudy *study) {
                                            : 1;
 }
 
-static bool optimize_needs_reduction(const OptimizeStudy *study) {
-    bool needs_reduction = false;
-    for (size_t i = 0; i < study->objectives.count; i++)
-        needs_reduction |= study_metric_is_reduction(study->objectives.at[i].metric);
-    for (size_t i = 0; i < study->constraints.count; i++)
-        needs_reduction |= study_metric_is_reduction(study->constraints.at[i].metric);
-    return needs_reduction;
+// Values that leave those of the scene.
+static void optimize_keep_values(StudyValue *values) {
+    for (size_t j = 0; j < SEARCH_VARIABLES; j++)
+        values[j] = (StudyValue){NULL, (double)NAN};
 }
 
 static void optimize_clear_dampers(Simulation *scene) {
@@ -176,18 +162,42 @@ static void optimize_clear_dampers(Simulation *scene) {
     *dampers = (Dampers){NULL, 0};
 }
 
-// The scene of given values with the seed or the record of a run; NULL values: those of the scene.
-static Status optimize_scene_make(const OptimizeStudy *study, const Simulation *simulation,
-                                  const StudyValue *values, bool has_dampers, size_t run,
-                                  const SimulationLimits *limits, Simulation *scene,
+// A number that the search makes smaller, or a bound that it keeps, of the metric m:
+// sign (m - bound) / scale.
+typedef struct OptimizeResult {
+    int metric;
+    double sign, bound, scale;
+    size_t constraint; // whose bound it is
+} OptimizeResult;
+
+typedef struct OptimizeWork {
+    StudyWork work;
+    const OptimizeStudy *study;
+    Optimum *answer;
+    Search *search;
+    OptimizeResult result[SEARCH_RESULTS];
+    size_t results;
+    size_t runs, pending; // of a candidate; candidates that may be without results
+    RunAggregate aggregate;
+    bool has_force;
+    bool is_failed;          // a run of the group
+    StudyMetrics *collected; // of the runs of a group
+    double *column;          // one metric of them
+    StudyMetrics *metrics;   // candidate by candidate
+    double *objectives;      // of every run: candidate by candidate, objective by objective
+} OptimizeWork;
+
+// The scene of given values with the seed or the record of a run.
+static Status optimize_scene_make(const OptimizeWork *work, const StudyValue *values,
+                                  bool has_dampers, size_t run, Simulation *scene,
                                   Problem *problem) {
-    StudyValue own[SEARCH_VARIABLES];
-    for (size_t j = 0; j < SEARCH_VARIABLES; j++)
-        own[j] = (StudyValue){NULL, (double)NAN};
-    TRY(study_scene_make(simulation, &study->variables, values != NULL ? values : own,
-                         &study->names, true, limits, scene, problem));
+    const OptimizeStudy *study = work->study;
+    const SimulationLimits *limits = work->work.limits;
+    TRY(study_scene_make(work->work.simulation, &study->variables, values, &study->names, true,
+                         limits, scene, problem));
     study_run_fix_solver(scene);
-    scene->output.reduction = has_dampers && optimize_needs_reduction(study);
+    for (size_t i = 0; i < work->results && has_dampers; i++)
+        scene->output.reduction |= study_metric_is_reduction(work->result[i].metric);
     if (optimize_has_seeds(study))
         ((ExcitationRandom *)(void *)scene->scene.excitation)->seed = study->over.first_seed + run;
     if (study->over.records.count > 0)
@@ -201,56 +211,94 @@ static Status optimize_scene_make(const OptimizeStudy *study, const Simulation *
 
 // --- The request ---
 
-static Status optimize_check_metric(const Simulation *simulation, int metric, const char *list,
-                                    size_t index, Problem *problem) {
-    const JsonPointer own = json_pointer_at(list, index);
-    return study_metric_check(simulation, metric, json_pointer_of(own.at, "metric").at, problem);
+static Status optimize_check_metric(const Simulation *simulation, int metric, const char *place,
+                                    Problem *problem) {
+    return study_metric_check(simulation, metric, json_pointer_of(place, "metric").at, problem);
 }
 
-static Status optimize_check_metrics(const OptimizeStudy *study, const Simulation *simulation,
-                                     Problem *problem) {
-    static const char objectives[] = "/study/objectives", constraints[] = "/study/constraints";
+static Status optimize_check_objectives(const OptimizeStudy *study, const Simulation *simulation,
+                                        Problem *problem) {
+    static const char place[] = "/study/objectives";
+    const OptimizeObjectives *objectives = &study->objectives;
     Status status = STATUS_OK;
-    if (study->objectives.count == 0)
-        status = problem_add(problem, STATUS_INVALID, objectives,
+    if (objectives->count == 0)
+        status = problem_add(problem, STATUS_INVALID, place,
                              "must have one objective, or two for a front");
-    for (size_t i = 0; i < study->objectives.count; i++) {
-        const int metric = study->objectives.at[i].metric;
-        if (i > 0 && metric == study->objectives.at[0].metric)
-            status = json_pointer_fault(problem, json_pointer_at(objectives, i).at, "metric",
+    for (size_t i = 0; i < objectives->count; i++) {
+        const JsonPointer own = json_pointer_at(place, i);
+        status = study_first_failure(
+            status, optimize_check_metric(simulation, objectives->at[i].metric, own.at, problem));
+        if (i > 0 && objectives->at[i].metric == objectives->at[0].metric)
+            status = json_pointer_fault(problem, own.at, "metric",
                                         "is that of the first objective: give another one");
-        if (optimize_check_metric(simulation, metric, objectives, i, problem) != STATUS_OK)
-            status = STATUS_INVALID;
     }
+    return status;
+}
+
+static Status optimize_check_constraints(const OptimizeStudy *study, const Simulation *simulation,
+                                         Problem *problem) {
+    Status status = STATUS_OK;
     for (size_t i = 0; i < study->constraints.count; i++) {
         const OptimizeConstraint *constraint = &study->constraints.at[i];
-        const JsonPointer own = json_pointer_at(constraints, i);
+        const JsonPointer own = json_pointer_at("/study/constraints", i);
+        status = study_first_failure(
+            status, optimize_check_metric(simulation, constraint->metric, own.at, problem));
         if (isnan(constraint->min) && isnan(constraint->max))
             status = problem_add(problem, STATUS_INVALID, own.at, "needs min, max or both");
         if (constraint->min > constraint->max)
             status = json_pointer_fault_real(
                 problem, own.at, "min", constraint->min, study_metric_unit(constraint->metric),
                 "must be at most max, which is %s", real_text(constraint->max).at);
-        if (optimize_check_metric(simulation, constraint->metric, constraints, i, problem) !=
-            STATUS_OK)
-            status = STATUS_INVALID;
     }
     return status;
 }
 
 static Status optimize_check_statistic(const OptimizeStudy *study, Problem *problem) {
+    static const char place[] = "/study/statistic";
     const OptimizeStatistic *statistic = &study->statistic;
-    if (statistic->of != NULL && !isnan(statistic->quantile))
-        return problem_add(problem, STATUS_INVALID, "/study/statistic",
-                           "is both %.8s and a quantile: leave one of them out", statistic->of);
-    if (statistic->of != NULL && strcmp(statistic->of, "mean") != 0 &&
-        strcmp(statistic->of, "max") != 0)
-        return problem_add(problem, STATUS_INVALID, "/study/statistic",
+    const bool has_quantile = !isnan(statistic->quantile);
+    if (statistic->of == CHOICE_ABSENT && !has_quantile)
+        return STATUS_OK;
+    if (statistic->of == OPTIMIZE_QUANTILE && !has_quantile)
+        return problem_add(problem, STATUS_INVALID, place,
                            "must be \"mean\", \"max\" or {\"quantile\": q}");
+    if (has_quantile && (statistic->of == OPTIMIZE_MEAN || statistic->of == OPTIMIZE_MAX))
+        return problem_add(problem, STATUS_INVALID, place,
+                           "is both %s and a quantile: leave one of them out",
+                           optimize_statistic_names[statistic->of]);
     if (statistic->quantile == 0 || statistic->quantile == 1)
         return problem_add(problem, STATUS_INVALID, "/study/statistic/quantile",
                            "must be above 0 and below 1; \"max\" is the largest");
+    if (optimize_runs(study) == 1 && !optimize_has_seeds(study) && study->over.records.count == 0)
+        return problem_add(problem, STATUS_INVALID, place,
+                           "needs the runs or records of /study/over: without them there is one "
+                           "run of each candidate");
     return STATUS_OK;
+}
+
+// Variables that the seeds or the records of the runs overwrite.
+static Status optimize_check_overwritten(const OptimizeStudy *study, bool is_record,
+                                         Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < study->variables.count; i++)
+        for (size_t k = 0; k < study_axis_pointer_count(&study->variables.at[i]); k++) {
+            const char *pointer = study_axis_pointer(&study->variables.at[i], k);
+            const bool is_kept =
+                optimize_has_seeds(study)
+                    ? !json_pointer_overlaps(pointer, "/excitation/seed") &&
+                          !json_pointer_overlaps(pointer, "/excitation/kind")
+                    : study->over.records.count == 0 ||
+                          !json_pointer_overlaps(pointer, "/excitation") ||
+                          (is_record && (strcmp(pointer, "/excitation/scale") == 0 ||
+                                         strcmp(pointer, "/excitation/start") == 0));
+            if (!is_kept)
+                status =
+                    problem_add(problem, STATUS_INVALID, json_pointer_at("/study/variables", i).at,
+                                "%.100s is replaced in each run by /study/over: leave one of "
+                                "them out",
+                                pointer);
+        }
+    return status;
 }
 
 static Status optimize_complete_over(OptimizeStudy *study, const Simulation *simulation,
@@ -258,47 +306,56 @@ static Status optimize_complete_over(OptimizeStudy *study, const Simulation *sim
     static const char place[] = "/study/over";
     const Excitation *excitation = scene_excitation(&simulation->scene);
     OptimizeOver *over = &study->over;
-    const bool has_records = over->records.count > 0;
-    if (!optimize_has_seeds(study) && over->first_seed != COUNT_ABSENT)
-        return problem_add(problem, STATUS_INVALID, place, "needs runs beside first_seed");
-    if (optimize_has_seeds(study) && has_records)
+    const bool has_seeds = optimize_has_seeds(study), has_records = over->records.count > 0;
+    if (over->runs == COUNT_ABSENT && over->first_seed == COUNT_ABSENT && !has_records)
+        return STATUS_OK;
+    if (has_seeds == has_records)
         return problem_add(problem, STATUS_INVALID, place,
-                           "has runs and records: leave one of them out");
+                           has_seeds ? "has runs and records: leave one of them out"
+                                     : "needs runs, or records");
+    if (!has_seeds && over->first_seed != COUNT_ABSENT)
+        return problem_add(problem, STATUS_INVALID, place, "needs runs beside first_seed");
+    if (has_seeds && excitation_kind(excitation) != &excitation_random)
+        return problem_add(problem, STATUS_INVALID, "/study/over/runs",
+                           "are seeds of a random base: /excitation/kind must be random, is %s",
+                           excitation_kind(excitation)->kind.name);
+    if (has_seeds && over->first_seed == COUNT_ABSENT)
+        over->first_seed = ((const ExcitationRandom *)(const void *)excitation)->seed;
+    if (has_seeds && (double)over->first_seed + (double)(over->runs - 1) > 0x1p53 - 1)
+        return problem_add(problem, STATUS_INVALID, "/study/over/first_seed",
+                           "is too large for %llu runs: seeds end at 2^53 - 1",
+                           (unsigned long long)over->runs);
     for (size_t i = 0; i < over->records.count; i++)
         if (over->records.at[i].named == NULL)
             return problem_add(problem, STATUS_INVALID,
                                json_pointer_at("/study/over/records", i).at,
                                "is a record that is not loaded");
-    if (!optimize_has_seeds(study))
-        return STATUS_OK;
-    if (excitation_kind(excitation) != &excitation_random)
-        return problem_add(problem, STATUS_INVALID, "/study/over/runs",
-                           "are seeds of a random base: /excitation/kind must be random, is %s",
-                           excitation_kind(excitation)->kind.name);
-    if (over->first_seed == COUNT_ABSENT)
-        over->first_seed = ((const ExcitationRandom *)(const void *)excitation)->seed;
-    if ((double)over->first_seed + (double)(over->runs - 1) > 0x1p53 - 1)
-        return problem_add(problem, STATUS_INVALID, "/study/over/first_seed",
-                           "is too large for %llu runs: seeds end at 2^53 - 1",
-                           (unsigned long long)over->runs);
-    return STATUS_OK;
+    return study_first_failure(
+        study_suite_check(&over->records, "/study/over/records", problem),
+        optimize_check_overwritten(study, excitation_kind(excitation) == &excitation_record,
+                                   problem));
 }
 
-// Where the values of one variable alone, in the given scene, make an invalid scene.
+// Where end or value `index` of one variable alone, in the given scene, makes an invalid scene.
 static Status optimize_check_value(const OptimizeStudy *study, const Simulation *simulation,
-                                   size_t variable, StudyValue value, const char *place,
-                                   const SimulationLimits *limits, Problem *scratch,
-                                   Problem *problem) {
+                                   size_t variable, size_t index, const SimulationLimits *limits,
+                                   Problem *scratch, Problem *problem) {
+    const StudyAxis *axis = &study->variables.at[variable];
+    const JsonPointer own = json_pointer_at("/study/variables", variable);
+    const bool is_range = study_axis_is_range(axis);
+    const JsonPointer place = is_range
+                                  ? json_pointer_of(own.at, index == 0 ? "from" : "to")
+                                  : json_pointer_at(json_pointer_of(own.at, "values").at, index);
     StudyValue values[SEARCH_VARIABLES];
     Simulation scene;
-    for (size_t j = 0; j < SEARCH_VARIABLES; j++)
-        values[j] = (StudyValue){NULL, (double)NAN};
-    values[variable] = value;
+    optimize_keep_values(values);
+    values[variable] = is_range ? (StudyValue){NULL, index == 0 ? axis->from : axis->to}
+                                : study_axis_value(axis, index);
     problem_clear(scratch);
     const Status status = study_scene_make(simulation, &study->variables, values, &study->names,
                                            true, limits, &scene, scratch);
     simulation_clear(&scene);
-    return status == STATUS_INVALID ? problem_add(problem, status, place, "%s", scratch->detail)
+    return status == STATUS_INVALID ? problem_add(problem, status, place.at, "%s", scratch->detail)
                                     : status;
 }
 
@@ -306,27 +363,14 @@ static Status optimize_check_values(const OptimizeStudy *study, const Simulation
                                     const SimulationLimits *limits, Problem *problem) {
     Problem *scratch = malloc(sizeof *scratch);
     Status status = status_made(scratch != NULL);
-    for (size_t i = 0; i < study->variables.count && scratch != NULL; i++) {
+    for (size_t i = 0; i < study->variables.count; i++) {
         const StudyAxis *axis = &study->variables.at[i];
-        const JsonPointer own = json_pointer_at("/study/variables", i);
-        const JsonPointer list = json_pointer_of(own.at, "values");
-        const size_t count =
+        const size_t values =
             axis->values.count < VALUES_CHECKED ? axis->values.count : VALUES_CHECKED;
-        for (size_t k = 0; k < (study_axis_is_range(axis) ? 2 : count); k++) {
-            const StudyValue value = study_axis_is_range(axis)
-                                         ? (StudyValue){NULL, k == 0 ? axis->from : axis->to}
-                                         : study_axis_value(axis, k);
-            const Status one = optimize_check_value(
-                study, simulation, i, value,
-                study_axis_is_range(axis) ? json_pointer_of(own.at, k == 0 ? "from" : "to").at
-                                          : json_pointer_at(list.at, k).at,
-                limits, scratch, problem);
-            if (one != STATUS_OK && one != STATUS_INVALID) {
-                free(scratch);
-                return one;
-            }
-            status = study_first_failure(status, one);
-        }
+        const size_t count = study_axis_is_range(axis) ? 2 : values;
+        for (size_t k = 0; k < count && (status == STATUS_OK || status == STATUS_INVALID); k++)
+            status = study_first_failure(
+                status, optimize_check_value(study, simulation, i, k, limits, scratch, problem));
     }
     free(scratch);
     return status;
@@ -349,7 +393,8 @@ static Status optimize_complete(void *request, const Simulation *simulation,
         return problem_add(problem, STATUS_INVALID, place, "must have at least one variable");
     const Status all[] = {
         study_axes_check(&study->variables, false, place, problem),
-        optimize_check_metrics(study, simulation, problem),
+        optimize_check_objectives(study, simulation, problem),
+        optimize_check_constraints(study, simulation, problem),
         optimize_check_statistic(study, problem),
         optimize_complete_over(study, simulation, problem),
         optimize_check_runs(study, problem),
@@ -358,10 +403,13 @@ static Status optimize_complete(void *request, const Simulation *simulation,
     TRY(study_axes_find(&study->variables, simulation, place, problem));
     TRY(optimize_check_values(study, simulation, limits, problem));
     TRY(status_first(all, COUNT(all)));
-    Simulation scene;
+    const OptimizeWork work = {.study = study,
+                               .work = {.simulation = simulation, .limits = limits}};
+    StudyValue values[SEARCH_VARIABLES];
+    optimize_keep_values(values);
     for (size_t i = 0; i < study->over.records.count; i++) {
-        const Status status =
-            optimize_scene_make(study, simulation, NULL, true, i, limits, &scene, problem);
+        Simulation scene;
+        const Status status = optimize_scene_make(&work, values, true, i, &scene, problem);
         simulation_clear(&scene);
         TRY(status);
     }
@@ -377,12 +425,7 @@ static void optimize_references(void *request, StudyReferences *references) {
                                     .suite_place = "/study/over/records"};
 }
 
-// --- Variables ---
-
-typedef struct OptimizeVariable {
-    const StudyAxis *axis;
-    bool is_whole; // a range of whole numbers, which the search takes for a choice
-} OptimizeVariable;
+// --- The space of the search ---
 
 // Whether all values are numbers that rise or fall.
 static bool optimize_is_ordered(const StudyAxis *axis) {
@@ -400,69 +443,67 @@ static bool optimize_is_ordered(const StudyAxis *axis) {
     return true;
 }
 
-static Status optimize_variables(const OptimizeStudy *study, const Simulation *simulation,
-                                 OptimizeVariable *variables, SearchSpace *space,
-                                 Problem *problem) {
+// The variables of the search: a range of whole numbers is a choice with an order.
+static Status optimize_variables(const OptimizeWork *work, SearchSpace *space, Problem *problem) {
+    const StudyAxes *axes = &work->study->variables;
     Simulation scene;
-    Status status = fields_copy(simulation_fields, simulation, &scene);
-    for (size_t j = 0; j < study->variables.count && status == STATUS_OK; j++) {
-        const StudyAxis *axis = &study->variables.at[j];
+    Status status = fields_copy(simulation_fields, work->work.simulation, &scene);
+    for (; space->variables < axes->count && status == STATUS_OK; space->variables++) {
+        const StudyAxis *axis = &axes->at[space->variables];
+        const JsonPointer place = json_pointer_at("/study/variables", space->variables);
+        SearchVariable *variable = &space->variable[space->variables];
         bool is_tag;
-        const Field *field = study_axis_find(axis, &scene, &is_tag,
-                                             json_pointer_at("/study/variables", j).at, problem);
-        if (field == NULL) {
+        const Field *field = study_axis_find(axis, &scene, &is_tag, place.at, problem);
+        if (field == NULL)
             status = STATUS_INVALID;
-            break;
-        }
-        const bool is_range = study_axis_is_range(axis);
-        variables[j].axis = axis;
-        variables[j].is_whole = is_range && field->kind == FIELD_KIND_COUNT;
-        if (variables[j].is_whole)
-            space->variable[j] =
+        else if (!study_axis_is_range(axis))
+            *variable = (SearchVariable){axis->values.count, optimize_is_ordered(axis)};
+        else if (field->kind == FIELD_KIND_COUNT)
+            *variable =
                 (SearchVariable){(size_t)fmin(floor(axis->to) - ceil(axis->from) + 1, 1e9), true};
-        else if (!is_range)
-            space->variable[j] = (SearchVariable){axis->values.count, optimize_is_ordered(axis)};
     }
     simulation_clear(&scene);
     return status;
 }
 
-static StudyValue optimize_variable_value(const OptimizeVariable *variable, double number) {
-    const StudyAxis *axis = variable->axis;
-    if (variable->is_whole)
-        return (StudyValue){NULL, ceil(axis->from) + number};
-    if (!study_axis_is_range(axis))
-        return study_axis_value(axis, (size_t)number);
-    return (StudyValue){NULL,
-                        number == 1 ? axis->to : axis->from + number * (axis->to - axis->from)};
+static Status optimize_search_new(OptimizeWork *work, Problem *problem) {
+    const OptimizeStudy *study = work->study;
+    SearchSpace space = {.objectives = study->objectives.count,
+                         .candidates = (size_t)study->max_candidates,
+                         .seed = study->search_seed};
+    TRY(optimize_variables(work, &space, problem));
+    for (size_t i = 0; i < study->objectives.count; i++)
+        work->result[work->results++] = (OptimizeResult){
+            study->objectives.at[i].metric,
+            study->objectives.at[i].goal == OPTIMIZE_MAXIMIZE ? -1 : 1, 0, 1, SIZE_MAX};
+    for (size_t i = 0; i < 2 * study->constraints.count; i++) {
+        const OptimizeConstraint *constraint = &study->constraints.at[i / 2];
+        const double bound = i % 2 == 0 ? constraint->min : constraint->max;
+        if (!isnan(bound))
+            work->result[work->results++] =
+                (OptimizeResult){constraint->metric, i % 2 == 0 ? -1 : 1, bound,
+                                 bound != 0 ? fabs(bound) : 1, i / 2};
+    }
+    space.constraints = work->results - space.objectives;
+    return search_new(&space, &work->search);
 }
 
-// --- The work ---
-
-typedef struct OptimizeWork {
-    StudyWork work;
-    const OptimizeStudy *study;
-    Optimum *answer;
-    Search *search;
-    OptimizeVariable variables[SEARCH_VARIABLES];
-    size_t runs, pending; // of a candidate; candidates that may be without results
-    RunAggregate aggregate;
-    bool has_force;
-    StudyMetrics *collected; // of the runs of a group
-    bool is_failed;          // a run of the group
-    StudyMetrics *metrics;   // candidate by candidate
-    double *objectives;      // of every run, as the search sees them
-} OptimizeWork;
-
-static double optimize_sign(const OptimizeStudy *study, size_t objective) {
-    return study->objectives.at[objective].goal == OPTIMIZE_MAXIMIZE ? -1 : 1;
+static StudyValue optimize_value(const OptimizeWork *work, size_t variable, double number) {
+    const StudyAxis *axis = &work->study->variables.at[variable];
+    if (!study_axis_is_range(axis))
+        return study_axis_value(axis, (size_t)number);
+    if (work->search->space.variable[variable].values > 0)
+        return (StudyValue){NULL, ceil(axis->from) + number};
+    const double inside = axis->from + number * (axis->to - axis->from);
+    return (StudyValue){NULL, number == 1 ? axis->to : fmin(inside, axis->to)};
 }
 
 static void optimize_values(const OptimizeWork *work, size_t candidate, StudyValue *values) {
-    const double *point = search_point(work->search, candidate);
     for (size_t j = 0; j < work->study->variables.count; j++)
-        values[j] = optimize_variable_value(&work->variables[j], point[j]);
+        values[j] = optimize_value(work, j, search_point(work->search, candidate)[j]);
 }
+
+// --- The runs ---
 
 static Status optimize_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
                              Problem *problem) {
@@ -470,110 +511,83 @@ static Status optimize_scene(const void *of, size_t member, Simulation *scene, S
     const size_t group = member / work->runs;
     StudyValue values[SEARCH_VARIABLES];
     (void)part;
+    optimize_keep_values(values);
     if (group >= GROUPS_BEFORE)
         optimize_values(work, group - GROUPS_BEFORE, values);
-    return optimize_scene_make(work->study, work->work.simulation,
-                               group >= GROUPS_BEFORE ? values : NULL, group != 1,
-                               member % work->runs, work->work.limits, scene, problem);
+    return optimize_scene_make(work, values, group != 1, member % work->runs, scene, problem);
 }
 
 // Proposes candidates as long as no more than `pending` of the model are without results.
 static Status optimize_propose(OptimizeWork *work) {
     Search *search = work->search;
-    const size_t sample = search_sample(search), added = search_added(search);
-    const size_t until = added + work->pending > sample ? added + work->pending : sample;
-    while (search_proposed(search) < until && search_proposed(search) < search_candidates(search))
+    const size_t until = search->added + work->pending > search->sample
+                             ? search->added + work->pending
+                             : search->sample;
+    while (search->proposed < until && search->proposed < search->space.candidates)
         TRY(search_propose(search));
-    work->work.wanted = (GROUPS_BEFORE + search_proposed(search)) * work->runs;
+    work->work.wanted = (GROUPS_BEFORE + search->proposed) * work->runs;
     return STATUS_OK;
 }
 
-// How far a bound is exceeded, relative to it.
-static double optimize_excess(double over, double bound) {
-    return over / (bound != 0 ? fabs(bound) : 1);
+static void optimize_results(const OptimizeWork *work, const StudyMetrics *metrics,
+                             double results[SEARCH_RESULTS]) {
+    for (size_t i = 0; i < work->results; i++) {
+        const OptimizeResult *own = &work->result[i];
+        results[i] = own->sign * (metrics->of[own->metric] - own->bound) / own->scale;
+    }
 }
 
-static void optimize_results(const OptimizeStudy *study, const StudyMetrics *metrics,
-                             double *results) {
-    size_t count = 0;
-    for (size_t i = 0; i < study->objectives.count; i++)
-        results[count++] = optimize_sign(study, i) * metrics->of[study->objectives.at[i].metric];
-    for (size_t i = 0; i < study->constraints.count; i++) {
-        const OptimizeConstraint *constraint = &study->constraints.at[i];
-        const double value = metrics->of[constraint->metric];
-        if (!isnan(constraint->min))
-            results[count++] = optimize_excess(constraint->min - value, constraint->min);
-        if (!isnan(constraint->max))
-            results[count++] = optimize_excess(value - constraint->max, constraint->max);
-    }
+// An objective of the runs of a candidate.
+static double *optimize_objectives(const OptimizeWork *work, size_t candidate, size_t objective) {
+    return work->objectives + (candidate * work->study->objectives.count + objective) * work->runs;
 }
 
 static Status optimize_close_candidate(OptimizeWork *work, size_t candidate,
                                        const StudyMetrics *metrics) {
     const OptimizeStudy *study = work->study;
-    const size_t objectives = study->objectives.count;
-    double results[OBJECTIVES + SEARCH_CONSTRAINTS];
+    double results[SEARCH_RESULTS];
     work->metrics[candidate] = *metrics;
-    optimize_results(study, metrics, results);
-    for (size_t run = 0; run < work->runs; run++)
-        for (size_t i = 0; i < objectives; i++)
-            work->objectives[(candidate * work->runs + run) * objectives + i] =
+    for (size_t i = 0; i < study->objectives.count; i++)
+        for (size_t run = 0; run < work->runs; run++)
+            optimize_objectives(work, candidate, i)[run] =
                 work->collected[run].of[study->objectives.at[i].metric];
+    optimize_results(work, metrics, results);
     search_add(work->search, results);
     work->answer->candidates++;
-    // All runs ended, and yet: a metric has no number.
-    if (!work->is_failed && search_violation(work->search, candidate) == (double)INFINITY)
-        TRY(study_failures_add(&work->answer->failures, UNKNOWN, "unknown",
-                               (candidate + GROUPS_BEFORE) * work->runs,
-                               "an objective or constraint is unknown"));
     return optimize_propose(work);
 }
 
 // The statistics over the runs of a group whose last one is there.
-static Status optimize_close(OptimizeWork *work, size_t group, double *column) {
+static Status optimize_close(OptimizeWork *work, size_t group) {
     StudyMetrics metrics;
     for (int i = 0; i < STUDY_METRIC_COUNT; i++) {
         for (size_t run = 0; run < work->runs; run++)
-            column[run] = work->collected[run].of[i];
-        metrics.of[i] =
-            work->is_failed ? (double)NAN : run_aggregate(&work->aggregate, column, work->runs);
+            work->column[run] = work->collected[run].of[i];
+        metrics.of[i] = work->is_failed ? (double)NAN
+                                        : run_aggregate(&work->aggregate, work->column, work->runs);
     }
-    if (group == 0)
-        work->answer->given.metrics = metrics;
-    else if (group == 1)
-        work->answer->undamped.metrics = metrics;
-    else
+    if (group >= GROUPS_BEFORE)
         return optimize_close_candidate(work, group - GROUPS_BEFORE, &metrics);
+    *(group == 0 ? &work->answer->given : &work->answer->undamped) = (OptimumScene){metrics};
     return STATUS_OK;
 }
 
 static Status optimize_fold(void *of, size_t member, StudyPart *part) {
     OptimizeWork *work = of;
     const size_t run = member % work->runs;
-    work->is_failed = work->is_failed && run > 0;
-    work->answer->runs++;
+    TRY(study_runs_add(&work->answer->made, &part->run, member));
+    work->is_failed = (work->is_failed && run > 0) || part->run.status != STATUS_OK;
     work->collected[run] = study_metrics_of(&part->run);
     if (!work->has_force)
         work->collected[run].peak_contact_force = (double)NAN;
-    if (part->run.why != NULL) {
-        work->is_failed = true;
-        work->answer->failed++;
-        TRY(study_failures_add(&work->answer->failures, (int)part->run.status,
-                               status_slug(part->run.status), member, part->run.why));
-    }
-    if (run + 1 < work->runs)
-        return STATUS_OK;
-    double *column = calloc(work->runs, sizeof *column);
-    TRY(status_made(column != NULL));
-    const Status status = optimize_close(work, member / work->runs, column);
-    free(column);
-    return status;
+    return run + 1 == work->runs ? optimize_close(work, member / work->runs) : STATUS_OK;
 }
 
 static void optimize_free(void *of) {
     OptimizeWork *work = of;
     search_free(work->search);
     free(work->collected);
+    free(work->column);
     free(work->metrics);
     free(work->objectives);
 }
@@ -581,10 +595,6 @@ static void optimize_free(void *of) {
 static Status optimize_begin(void *of, const StudyTools *tools, Problem *problem) {
     OptimizeWork *work = of;
     const OptimizeStudy *study = work->study = work->work.study;
-    SearchSpace space = {.variables = study->variables.count,
-                         .objectives = study->objectives.count,
-                         .candidates = (size_t)study->max_candidates,
-                         .seed = study->search_seed};
     (void)tools;
     work->answer = work->work.answer;
     for (size_t i = 0; i < study->objectives.count; i++) {
@@ -595,22 +605,19 @@ static Status optimize_begin(void *of, const StudyTools *tools, Problem *problem
     work->runs = optimize_runs(study);
     work->pending = 1 + (PENDING_RUNS - 1) / work->runs;
     work->aggregate =
-        (RunAggregate){study->statistic.of != NULL && strcmp(study->statistic.of, "max") == 0,
-                       study->statistic.quantile};
+        (RunAggregate){study->statistic.of == OPTIMIZE_MAX, study->statistic.quantile};
     work->has_force = simulation_has_force(work->work.simulation);
-    for (size_t i = 0; i < study->constraints.count; i++)
-        space.constraints += (size_t)!isnan(study->constraints.at[i].min) +
-                             (size_t)!isnan(study->constraints.at[i].max);
-    TRY(optimize_variables(study, work->work.simulation, work->variables, &space, problem));
-    TRY(search_new(&space, &work->search));
-    const size_t candidates = search_candidates(work->search);
+    TRY(optimize_search_new(work, problem));
+    const size_t candidates = work->search->space.candidates,
+                 objectives = candidates * work->runs * study->objectives.count;
     work->collected = calloc(work->runs, sizeof *work->collected);
+    work->column = calloc(work->runs, sizeof *work->column);
     work->metrics = calloc(candidates, sizeof *work->metrics);
-    work->objectives =
-        calloc(candidates * work->runs * study->objectives.count, sizeof *work->objectives);
-    TRY(status_made(work->collected != NULL && work->metrics != NULL && work->objectives != NULL));
+    work->objectives = calloc(objectives, sizeof *work->objectives);
+    TRY(status_made(work->collected != NULL && work->column != NULL && work->metrics != NULL &&
+                    work->objectives != NULL));
     work->work.members = (GROUPS_BEFORE + candidates) * work->runs;
-    work->work.bytes = candidates * work->runs * study->objectives.count * sizeof(double);
+    work->work.bytes = objectives * sizeof(double);
     work->work.part_bytes = sizeof(StudyPart);
     return optimize_propose(work);
 }
@@ -624,7 +631,7 @@ static Status optimum_put_values(const OptimizeWork *work, size_t candidate,
     for (size_t j = 0; j < work->study->variables.count; j++) {
         OptimumValue *value = list_append(target, sizeof *value);
         TRY(status_made(value != NULL));
-        TRY(text_copy(study_axis_pointer(work->variables[j].axis, 0), &value->pointer));
+        TRY(study_axis_member(&work->study->variables.at[j], &value->member));
         TRY(text_copy(values[j].json != NULL ? values[j].json : real_text(values[j].number).at,
                       &value->value));
     }
@@ -646,82 +653,109 @@ static Status optimum_put_candidate(const OptimizeWork *work, size_t candidate,
     return STATUS_OK;
 }
 
-static const double *optimum_runs(const OptimizeWork *work, size_t candidate) {
-    return work->objectives + candidate * work->runs * work->study->objectives.count;
-}
-
-// None where it is unknown.
-static Status optimum_put_interval(const double interval[2], Reals *target) {
+// Of an aggregate over `column`; none where it is unknown.
+static Status optimum_put_interval(const OptimizeWork *work, Reals *target) {
+    double interval[2];
+    run_aggregate_interval(&work->aggregate, work->column, work->runs, interval);
     return isnan(interval[0]) ? STATUS_OK : study_copy_reals(interval, 2, target);
 }
 
-static Status optimum_put_best(const OptimizeWork *work, size_t candidate, double *column) {
+static Status optimum_put_best(const OptimizeWork *work, size_t candidate) {
     OptimumBest *best = &work->answer->best;
-    const size_t objectives = work->study->objectives.count;
     best->feasible = true;
     best->metrics = work->metrics[candidate];
-    for (size_t i = 0; i < objectives; i++) {
+    for (size_t i = 0; i < work->study->objectives.count; i++) {
         OptimumObjective *objective = list_append(&best->objectives, sizeof *objective);
         TRY(status_made(objective != NULL));
-        double interval[2];
-        for (size_t run = 0; run < work->runs; run++)
-            column[run] = optimum_runs(work, candidate)[run * objectives + i];
-        run_aggregate_interval(&work->aggregate, column, work->runs, interval);
         objective->metric = work->study->objectives.at[i].metric;
         objective->value = best->metrics.of[objective->metric];
-        TRY(optimum_put_interval(interval, &objective->interval_95));
+        memcpy(work->column, optimize_objectives(work, candidate, i),
+               work->runs * sizeof *work->column);
+        TRY(optimum_put_interval(work, &objective->interval_95));
     }
     return optimum_put_values(work, candidate, &best->values);
 }
 
-static Status optimum_put_region(OptimizeWork *work, size_t candidate) {
-    const double tolerance = region_tolerance * fabs(search_results(work->search, candidate)[0]);
-    for (size_t j = 0; j < work->study->variables.count; j++) {
+static bool optimum_is_good(const Search *search, size_t best, size_t candidate) {
+    const double value = search_results(search, best)[0];
+    return search_violation(search, candidate) == 0 &&
+           search_results(search, candidate)[0] <= value + region_tolerance * fabs(value);
+}
+
+// Enlarges the box by a good candidate, unless it would then contain one that is not good, or
+// several values of a choice without order.
+static void optimum_enlarge(const Search *search, size_t best, size_t candidate, double *low,
+                            double *high) {
+    const size_t n = search->space.variables;
+    double lower[SEARCH_VARIABLES], upper[SEARCH_VARIABLES];
+    for (size_t j = 0; j < n; j++) {
+        const SearchVariable *variable = &search->space.variable[j];
+        lower[j] = fmin(low[j], search_point(search, candidate)[j]);
+        upper[j] = fmax(high[j], search_point(search, candidate)[j]);
+        if (variable->values > 0 && !variable->is_ordered && lower[j] != upper[j])
+            return;
+    }
+    for (size_t i = 0; i < search->added; i++) {
+        const double *point = search_point(search, i);
+        size_t inside = 0;
+        while (inside < n && point[inside] >= lower[inside] && point[inside] <= upper[inside])
+            inside++;
+        if (inside == n && !optimum_is_good(search, best, i))
+            return;
+    }
+    memcpy(low, lower, n * sizeof *low);
+    memcpy(high, upper, n * sizeof *high);
+}
+
+static Status optimum_put_region(const OptimizeWork *work, size_t best) {
+    const Search *search = work->search;
+    double ends[2][SEARCH_VARIABLES];
+    for (size_t k = 0; k < 2; k++)
+        memcpy(ends[k], search_point(search, best), search->space.variables * sizeof(double));
+    for (size_t i = 0; i < search->added; i++)
+        if (optimum_is_good(search, best, i))
+            optimum_enlarge(search, best, i, ends[0], ends[1]);
+    for (size_t j = 0; j < search->space.variables; j++) {
         OptimumInterval *interval = list_append(&work->answer->region, sizeof *interval);
-        const OptimizeVariable *variable = &work->variables[j];
-        double ends[2];
+        const SearchVariable *variable = &search->space.variable[j];
+        double values[2] = {(double)NAN, (double)NAN};
         TRY(status_made(interval != NULL));
-        TRY(text_copy(study_axis_pointer(variable->axis, 0), &interval->pointer));
-        TRY(search_region(work->search, candidate, j, tolerance, &ends[0], &ends[1]));
-        interval->low = interval->high = (double)NAN;
-        if (isnan(ends[0]))
-            continue;
-        for (size_t k = 0; k < 2; k++) {
-            const StudyValue value = optimize_variable_value(variable, ends[k]);
-            ends[k] = value.json != NULL ? strtod(value.json, NULL) : value.number;
+        TRY(study_axis_member(&work->study->variables.at[j], &interval->member));
+        for (size_t k = 0; k < 2 && (variable->values == 0 || variable->is_ordered); k++) {
+            const StudyValue value = optimize_value(work, j, ends[k][j]);
+            values[k] = value.json != NULL ? strtod(value.json, NULL) : value.number;
         }
-        interval->low = fmin(ends[0], ends[1]);
-        interval->high = fmax(ends[0], ends[1]);
+        interval->low = fmin(values[0], values[1]);
+        interval->high = fmax(values[0], values[1]);
     }
     return STATUS_OK;
 }
 
-static Status optimum_put_rival(const OptimizeWork *work, size_t best, size_t candidate,
-                                double *column) {
-    static const RunAggregate mean = {false, (double)NAN};
+static Status optimum_put_rival(const OptimizeWork *work, size_t best, size_t candidate) {
     OptimumRival *rival = list_append(&work->answer->rivals, sizeof *rival);
-    double interval[2] = {(double)NAN, (double)NAN};
+    const int metric = work->study->objectives.at[0].metric;
     TRY(status_made(rival != NULL));
     TRY(optimum_put_values(work, candidate, &rival->values));
-    const int metric = work->study->objectives.at[0].metric;
     rival->difference = work->metrics[candidate].of[metric] - work->metrics[best].of[metric];
+    if (work->aggregate.is_max || !isnan(work->aggregate.quantile))
+        return STATUS_OK; // that of a difference is not the difference of two
     for (size_t run = 0; run < work->runs; run++)
-        column[run] = optimum_runs(work, candidate)[run] - optimum_runs(work, best)[run];
-    if (!work->aggregate.is_max && isnan(work->aggregate.quantile))
-        run_aggregate_interval(&mean, column, work->runs, interval);
-    return optimum_put_interval(interval, &rival->interval_95);
+        work->column[run] =
+            optimize_objectives(work, candidate, 0)[run] - optimize_objectives(work, best, 0)[run];
+    return optimum_put_interval(work, &rival->interval_95);
 }
 
 // The best candidates in turn whose distance from the best and from each other is large enough.
-static Status optimum_put_rivals(const OptimizeWork *work, size_t best, double *column) {
+static Status optimum_put_rivals(const OptimizeWork *work, size_t best) {
     const Search *search = work->search;
     size_t taken[1 + RIVALS] = {best};
     for (size_t count = 1; count <= RIVALS; count++) {
         size_t next = SIZE_MAX;
-        for (size_t i = 0; i < search_added(search); i++) {
+        for (size_t i = 0; i < search->added; i++) {
             bool is_near = search_violation(search, i) > 0;
             for (size_t k = 0; k < count && !is_near; k++)
-                is_near = search_distance(search, i, taken[k]) < rival_distance;
+                is_near = search_distance(search, search_point(search, i),
+                                          search_point(search, taken[k])) < rival_distance;
             if (!is_near && (next == SIZE_MAX ||
                              search_results(search, i)[0] < search_results(search, next)[0]))
                 next = i;
@@ -729,170 +763,151 @@ static Status optimum_put_rivals(const OptimizeWork *work, size_t best, double *
         if (next == SIZE_MAX)
             break;
         taken[count] = next;
-        TRY(optimum_put_rival(work, best, next, column));
+        TRY(optimum_put_rival(work, best, next));
     }
     return STATUS_OK;
 }
 
-typedef struct OptimumPoint {
-    double first, second;
-    size_t candidate;
-} OptimumPoint;
-
-static int optimum_compare(const void *a, const void *b) {
-    const OptimumPoint *x = a, *y = b;
-    if (x->first != y->first)
-        return x->first < y->first ? -1 : 1;
-    if (x->second != y->second)
-        return x->second < y->second ? -1 : 1;
-    return (x->candidate > y->candidate) - (x->candidate < y->candidate);
+// The front, by the first objective: the next one is the best by it of those that are better by the
+// second than the last.
+static Status optimum_put_front(const OptimizeWork *work) {
+    const Search *search = work->search;
+    double bound = INFINITY;
+    for (;;) {
+        size_t next = SIZE_MAX;
+        for (size_t i = 0; i < search->added; i++) {
+            const double *own = search_results(search, i);
+            const double *least = next != SIZE_MAX ? search_results(search, next) : NULL;
+            if (search_violation(search, i) == 0 && own[1] < bound &&
+                (least == NULL || own[0] < least[0] || (own[0] == least[0] && own[1] < least[1])))
+                next = i;
+        }
+        if (next == SIZE_MAX)
+            return STATUS_OK;
+        bound = search_results(search, next)[1];
+        TRY(optimum_put_candidate(work, next, &work->answer->front));
+    }
 }
 
-// The front, and as the best its candidate nearest to both best values.
-static Status optimum_put_front(const OptimizeWork *work, size_t *best) {
-    const Search *search = work->search;
-    OptimumPoint *points = calloc(search_added(search) + 1, sizeof *points);
-    size_t count = 0, front = 0;
-    Status status = status_made(points != NULL);
-    for (size_t i = 0; points != NULL && i < search_added(search); i++)
-        if (search_violation(search, i) == 0)
-            points[count++] =
-                (OptimumPoint){search_results(search, i)[0], search_results(search, i)[1], i};
-    if (count > 0)
-        qsort(points, count, sizeof *points, optimum_compare);
-    for (size_t i = 0; i < count; i++)
-        if (front == 0 || points[i].second < points[front - 1].second)
-            points[front++] = points[i];
+// The candidate of the front nearest to the best values of both objectives.
+static size_t optimum_compromise(const OptimizeWork *work) {
+    const OptimumCandidates *front = &work->answer->front;
+    size_t best = SIZE_MAX;
     double nearest = INFINITY;
-    for (size_t i = 0; i < front && status == STATUS_OK; i++) {
-        const double a = points[front - 1].first - points[0].first,
-                     b = points[0].second - points[front - 1].second;
-        const double distance = fmax(a > 0 ? (points[i].first - points[0].first) / a : 0,
-                                     b > 0 ? (points[i].second - points[front - 1].second) / b : 0);
+    for (size_t i = 0; i < front->count; i++) {
+        double distance = 0;
+        for (size_t k = 0; k < 2; k++) {
+            const double *ends[] = {front->at[0].objectives.at,
+                                    front->at[front->count - 1].objectives.at};
+            const double range = ends[1 - k][k] - ends[k][k];
+            if (range != 0)
+                distance = fmax(distance, (front->at[i].objectives.at[k] - ends[k][k]) / range);
+        }
         if (distance < nearest) {
             nearest = distance;
-            *best = points[i].candidate;
+            best = (size_t)front->at[i].index;
         }
-        status = optimum_put_candidate(work, points[i].candidate, &work->answer->front);
     }
-    free(points);
-    return status;
+    return best;
 }
 
-// Names the constraint whose violation makes the least infeasible candidate infeasible.
+// Names the constraint that the least infeasible candidate violates most.
 static Status optimum_warn_infeasible(const OptimizeWork *work) {
-    const OptimizeStudy *study = work->study;
     const Search *search = work->search;
-    Warnings *warnings = &work->answer->warnings;
-    size_t least = 0;
-    for (size_t i = 1; i < search_added(search); i++)
+    Warnings *warnings = &work->answer->made.warnings;
+    size_t least = 0, worst = search->space.objectives;
+    for (size_t i = 1; i < search->added; i++)
         if (search_violation(search, i) < search_violation(search, least))
             least = i;
-    const double violation = search_violation(search, least);
-    if (violation == (double)INFINITY)
+    if (search_violation(search, least) == (double)INFINITY)
         return warnings_add(warnings, "/study/variables",
-                            "no candidate could be run: see the failures");
-    const double *result = search_results(search, least) + study->objectives.count;
-    for (size_t i = 0; i < study->constraints.count; i++) {
-        const OptimizeConstraint *constraint = &study->constraints.at[i];
-        const double bounds[] = {constraint->min, constraint->max};
-        for (size_t k = 0; k < COUNT(bounds); k++)
-            if (!isnan(bounds[k]) && *result++ == violation)
-                return warnings_add(
-                    warnings, json_pointer_at("/study/constraints", i).at,
-                    "no candidate keeps the constraints: %s, which must be at %s %s, is violated "
-                    "least, by candidate %zu with %s",
-                    study_metric_names[constraint->metric], k == 0 ? "least" : "most",
-                    real_text(bounds[k]).at, least,
-                    real_text(work->metrics[least].of[constraint->metric]).at);
-    }
-    return STATUS_OK;
+                            "no candidate has all its metrics: see the failures");
+    const double *results = search_results(search, least);
+    for (size_t i = worst; i < work->results; i++)
+        worst = results[i] > results[worst] ? i : worst;
+    const OptimizeResult *own = &work->result[worst];
+    return warnings_add(
+        warnings, json_pointer_at("/study/constraints", own->constraint).at,
+        "no candidate keeps the constraints: %s, which must be at %s %s, is violated least, by "
+        "candidate %zu with %s",
+        study_metric_names[own->metric], own->sign < 0 ? "least" : "most", real_text(own->bound).at,
+        least, real_text(work->metrics[least].of[own->metric]).at);
 }
 
 static Status optimum_warn_best(const OptimizeWork *work, size_t best) {
     const OptimizeStudy *study = work->study;
-    Warnings *warnings = &work->answer->warnings;
-    const double *point = search_point(work->search, best);
-    double given[OBJECTIVES + SEARCH_CONSTRAINTS];
+    const Search *search = work->search;
+    Warnings *warnings = &work->answer->made.warnings;
+    const double *point = search_point(search, best), *results = search_results(search, best);
     for (size_t j = 0; j < study->variables.count; j++)
-        if (study_axis_is_range(work->variables[j].axis) && !work->variables[j].is_whole &&
-            (point[j] < 0.01 || point[j] > 0.99))
+        if (search->space.variable[j].values == 0 && (point[j] < 0.01 || point[j] > 0.99))
             TRY(warnings_add(warnings, json_pointer_at("/study/variables", j).at,
                              "the best value is at the end of the range: a wider one may have a "
                              "better value"));
-    optimize_results(study, &work->answer->given.metrics, given);
-    bool is_feasible = !isnan(given[0]);
-    for (size_t i = study->objectives.count; i < COUNT(given) && is_feasible; i++)
-        is_feasible =
-            i >= study->objectives.count + 2 * study->constraints.count || !(given[i] > 0);
-    if (study->objectives.count == 1 && is_feasible &&
-        given[0] < search_results(work->search, best)[0])
+    double given[SEARCH_RESULTS];
+    optimize_results(work, &work->answer->given.metrics, given);
+    if (study->objectives.count == 1 && search_excess(&search->space, given) == 0 &&
+        given[0] < results[0])
         TRY(warnings_add(warnings, "/study/max_candidates",
                          "the given scene is better than every candidate: allow more of them, or "
                          "ranges that contain its values"));
-    return STATUS_OK;
+    bool is_same = search->added > 1;
+    for (size_t i = 0; i < search->added; i++)
+        for (size_t k = 0; k < study->objectives.count; k++)
+            is_same = is_same && search_results(search, i)[k] == results[k];
+    return is_same ? warnings_add(warnings, "/study/variables",
+                                  "all candidates have the same objective: nothing that is varied "
+                                  "changes it")
+                   : STATUS_OK;
 }
 
 static Status optimize_end(void *of, const StudyTools *tools, Problem *problem) {
     OptimizeWork *work = of;
-    size_t best = SIZE_MAX;
+    const bool has_front = work->study->objectives.count > 1;
     (void)tools;
     (void)problem;
-    for (size_t i = 0; i < search_added(work->search); i++)
+    for (size_t i = 0; i < work->search->added; i++)
         TRY(optimum_put_candidate(work, i, &work->answer->history));
-    if (work->study->objectives.count == 1)
-        best = search_best(work->search, 0);
-    else
-        TRY(optimum_put_front(work, &best));
+    TRY(study_runs_warn(&work->answer->made));
+    if (has_front)
+        TRY(optimum_put_front(work));
+    const size_t best = has_front ? optimum_compromise(work) : search_best(work->search, 0);
     if (best == SIZE_MAX)
         return optimum_warn_infeasible(work);
-    double *column = calloc(work->runs, sizeof *column);
-    Status status = status_made(column != NULL);
-    if (status == STATUS_OK)
-        status = optimum_put_best(work, best, column);
-    if (status == STATUS_OK && work->study->objectives.count == 1)
-        status = optimum_put_region(work, best);
-    if (status == STATUS_OK && work->study->objectives.count == 1)
-        status = optimum_put_rivals(work, best, column);
-    free(column);
-    TRY(status);
+    TRY(optimum_put_best(work, best));
+    if (!has_front) {
+        TRY(optimum_put_region(work, best));
+        TRY(optimum_put_rivals(work, best));
+    }
     return optimum_warn_best(work, best);
 }
 
-// From a sample of the candidates: some need many more steps than others.
+static Status optimize_sample_scene(const void *of, size_t candidate,
+                                    const SimulationLimits *limits, Simulation *scene) {
+    StudyValue values[SEARCH_VARIABLES];
+    (void)limits;
+    optimize_values(of, candidate, values);
+    return optimize_scene_make(of, values, true, 0, scene, NULL);
+}
+
 static Status optimize_cost(const void *request, const Simulation *simulation,
                             const SimulationLimits *limits, double *steps) {
-    const OptimizeStudy *study = request;
-    SearchSpace space = {.variables = study->variables.count,
-                         .objectives = 1,
-                         .candidates = COST_SAMPLES,
-                         .seed = study->search_seed};
-    OptimizeVariable variables[SEARCH_VARIABLES];
-    Search *search;
-    double sum = 0;
-    TRY(optimize_variables(study, simulation, variables, &space, NULL));
-    TRY(search_new(&space, &search));
-    const size_t sample = search_sample(search);
+    OptimizeWork work = {.study = request, .work = {.simulation = simulation, .limits = limits}};
+    TRY(optimize_search_new(&work, NULL));
+    Search *search = work.search;
+    const double candidates = (double)search->space.candidates;
     Status status = STATUS_OK;
-    for (size_t i = 0; i < sample && status == STATUS_OK; i++) {
-        StudyValue values[SEARCH_VARIABLES];
-        Simulation scene;
+    while (search->proposed < search->sample && status == STATUS_OK)
         status = search_propose(search);
-        if (status != STATUS_OK)
-            break;
-        for (size_t j = 0; j < study->variables.count; j++)
-            values[j] = optimize_variable_value(&variables[j], search_point(search, i)[j]);
-        if (optimize_scene_make(study, simulation, values, true, 0, limits, &scene, NULL) ==
-            STATUS_OK)
-            sum += simulation_cost(&scene).steps / (double)sample;
-        simulation_clear(&scene);
-    }
-    search_free(search);
-    *steps = sum * (double)(study->max_candidates + GROUPS_BEFORE) * (double)optimize_runs(study);
+    if (status == STATUS_OK)
+        status = study_sample_cost(optimize_sample_scene, &work, search->sample, COST_SAMPLES,
+                                   limits, steps);
+    *steps *=
+        (candidates + GROUPS_BEFORE) / (double)search->sample * (double)optimize_runs(work.study);
     // The search itself, measured: 10 ms for a candidate with 8 variables.
-    if (study->max_candidates > sample)
-        *steps += (double)study->max_candidates * 1e-3 * (double)(2 + study->variables.count) /
-                  SOLVER_STEP;
+    if (search->space.candidates > search->sample)
+        *steps += candidates * 1e-3 * (double)(2 + search->space.variables) / SOLVER_STEP;
+    search_free(search);
     return status;
 }
 

@@ -3,7 +3,6 @@
 #ifndef CORE_STUDY_OPTIMIZE_H
 #define CORE_STUDY_OPTIMIZE_H
 
-#include "core/base/report.h"
 #include "core/study/axis.h"
 #include "core/study/statistics.h"
 
@@ -30,13 +29,19 @@ typedef struct OptimizeConstraints {
 
 // The runs of each candidate; all absent: one, of the scene as it is.
 typedef struct OptimizeOver {
-    uint64_t runs, first_seed;
+    uint64_t runs, first_seed; // 0 runs: those of the records
     PinnedRecords records;
 } OptimizeOver;
 
+typedef enum OptimizeStatisticOf {
+    OPTIMIZE_MEAN,
+    OPTIMIZE_MAX,
+    OPTIMIZE_QUANTILE
+} OptimizeStatisticOf;
+
 // Of a metric over these runs.
 typedef struct OptimizeStatistic {
-    char *of;        // "mean" or "max"; NULL beside a quantile
+    int of;          // OptimizeStatisticOf; CHOICE_ABSENT: the mean
     double quantile; // NAN: none
 } OptimizeStatistic;
 
@@ -54,8 +59,8 @@ typedef struct OptimizeStudy {
 
 // The value of a variable.
 typedef struct OptimumValue {
-    char *pointer; // the first one of tied members
-    char *value;   // a scalar as JSON text
+    StudyMember member;
+    char *value; // a scalar as JSON text
 } OptimumValue;
 
 typedef struct OptimumValues {
@@ -86,9 +91,9 @@ typedef struct OptimumScene {
     StudyMetrics metrics;
 } OptimumScene;
 
-// Where one variable may be without much loss.
+// One side of a box around the best.
 typedef struct OptimumInterval {
-    char *pointer;
+    StudyMember member;
     double low, high;
 } OptimumInterval;
 
@@ -125,8 +130,8 @@ extern const Field optimum_candidate_fields[];
 // The answer.
 typedef struct Optimum {
     Variant variant;
-    uint64_t candidates; // evaluated
-    uint64_t runs, failed;
+    StudyRuns made;
+    uint64_t candidates;           // evaluated
     OptimizeObjectives objectives; // as requested
     OptimumBest best;              // values empty: there is no feasible candidate
     OptimumScene given, undamped;
@@ -134,8 +139,6 @@ typedef struct Optimum {
     OptimumRivals rivals;
     OptimumCandidates front; // of two objectives, none of which can improve without the other
     OptimumCandidates history;
-    StudyFailures failures;
-    Warnings warnings;
 } Optimum;
 
 #endif

@@ -765,7 +765,7 @@ static void optimize_put_metrics(const Optimum *optimum, Bytes *json) {
 
 static void optimize_put_values(const OptimumValues *values, Bytes *json) {
     for (size_t i = 0; i < values->count; i++)
-        bytes_json(json, "%s: %p, ", values->at[i].pointer, values->at[i].value);
+        bytes_json(json, "%s: %p, ", values->at[i].member.pointer, values->at[i].value);
 }
 
 // The metrics side by side; the front and the rivals with a column for each variable.

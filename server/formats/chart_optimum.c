@@ -56,10 +56,9 @@ static const char *optimum_name(Chart *chart, const OptimumCandidate *candidate)
     char text[CHART_TEXT] = "";
     for (size_t i = 0; i < candidate->values.count; i++) {
         const OptimumValue *value = &candidate->values.at[i];
-        const char *last = strrchr(value->pointer, '/');
-        text_list(
-            text, sizeof text,
-            chart_text(chart, "%s %.24s", last != NULL ? last + 1 : value->pointer, value->value));
+        const char *pointer = value->member.pointer, *last = strrchr(pointer, '/');
+        text_list(text, sizeof text,
+                  chart_text(chart, "%s %.24s", last != NULL ? last + 1 : pointer, value->value));
     }
     return chart_text(chart, "%llu: %s", (unsigned long long)candidate->index, text);
 }
@@ -132,16 +131,16 @@ void chart_optimum(const Variant *answer, Bytes *bytes) {
     const Optimum *optimum = (const Optimum *)(const void *)answer;
     Chart chart = {.width = 720, .left = 84, .right = 130, .title = "Optimisation"};
     bytes_format(&chart.description, "%llu candidates, %llu runs, of which %llu failed.",
-                 (unsigned long long)optimum->candidates, (unsigned long long)optimum->runs,
-                 (unsigned long long)optimum->failed);
+                 (unsigned long long)optimum->candidates, (unsigned long long)optimum->made.runs,
+                 (unsigned long long)optimum->made.failed);
     for (size_t i = 0; i < optimum->best.objectives.count; i++) {
         const OptimumObjective *objective = &optimum->best.objectives.at[i];
         chart_note(
             &chart, " Best: ",
             chart_text(&chart, "%s %.4g", study_metric_names[objective->metric], objective->value));
     }
-    for (size_t i = 0; i < optimum->warnings.count; i++)
-        chart_note(&chart, " ", optimum->warnings.at[i].detail);
+    for (size_t i = 0; i < optimum->made.warnings.count; i++)
+        chart_note(&chart, " ", optimum->made.warnings.at[i].detail);
     if (optimum->objectives.count == 2)
         optimum_add_front(&chart, optimum);
     else if (optimum->objectives.count == 1)
@@ -158,7 +157,7 @@ void optimum_table(const Variant *answer, StudyTable *table) {
         study_table_row(table);
         study_table_number(table, "index", NULL, (double)row->index);
         for (size_t j = 0; j < row->values.count; j++)
-            study_table_scalar(table, row->values.at[j].pointer, row->values.at[j].value);
+            study_table_scalar(table, row->values.at[j].member.pointer, row->values.at[j].value);
         for (size_t k = 0; k < optimum->objectives.count; k++) {
             const int metric = optimum->objectives.at[k].metric;
             const bool is_known = k < row->objectives.count;

@@ -105,15 +105,13 @@ static void make_scene(const Drawn *drawn, const double *values, size_t run, Sim
     }
 }
 
-// Statistics of objective and constraint; `place` has the variables, 0 to 1 within their range.
-static void evaluate(const Drawn *drawn, const double *place, Workspace *workspace,
-                     double *objective, double *constraint) {
+// Statistics of objective and constraint at values of the variables.
+static void evaluate(const Drawn *drawn, const double *at, Workspace *workspace, double *objective,
+                     double *constraint) {
     double values[VARIABLES], objectives[64], constraints[64] = {0};
     memcpy(values, drawn->given, sizeof values);
-    for (size_t j = 0; j < drawn->variables; j++) {
-        const size_t v = drawn->variable[j];
-        values[v] = lowest[v] + place[j] * (highest[v] - lowest[v]);
-    }
+    for (size_t j = 0; j < drawn->variables; j++)
+        values[drawn->variable[j]] = at[j];
     for (size_t run = 0; run < drawn->runs; run++) {
         Simulation scene = {0};
         Problem problem;
@@ -138,6 +136,12 @@ static void evaluate(const Drawn *drawn, const double *place, Workspace *workspa
     *constraint = run_aggregate(&drawn->aggregate, constraints, drawn->runs);
 }
 
+// The value of a variable at a share of its range.
+static double value_at(const Drawn *drawn, size_t variable, double share) {
+    const size_t v = drawn->variable[variable];
+    return lowest[v] + share * (highest[v] - lowest[v]);
+}
+
 static int by_value(const void *a, const void *b) {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
@@ -148,15 +152,15 @@ static double draw_bound(const Drawn *drawn, uint64_t problem, double share) {
     enum { SAMPLES = 32 };
     double values[SAMPLES], objective;
     for (size_t i = 0; i < SAMPLES; i++) {
-        double place[VARIABLES];
+        double at[VARIABLES];
         for (size_t j = 0; j < drawn->variables; j++)
-            place[j] = uniform(problem, 1000 + (uint32_t)(VARIABLES * i + j));
-        evaluate(drawn, place, NULL, &objective, &values[i]);
+            at[j] = value_at(drawn, j, uniform(problem, 1000 + (uint32_t)(VARIABLES * i + j)));
+        evaluate(drawn, at, NULL, &objective, &values[i]);
     }
     qsort(values, SAMPLES, sizeof *values, by_value);
-    const double at = share * (SAMPLES - 1);
-    const size_t below = (size_t)at;
-    return values[below] + (at - (double)below) * (values[below + 1] - values[below]);
+    const double rank = share * (SAMPLES - 1);
+    const size_t below = (size_t)rank;
+    return values[below] + (rank - (double)below) * (values[below + 1] - values[below]);
 }
 
 static Drawn draw(uint64_t problem) {
@@ -217,10 +221,10 @@ static double brute_force(const Drawn *drawn, Workspace *workspace) {
     for (int i = 0; i < 64; i++)
         root = pow(1 + root, 1 / (double)(drawn->variables + 1));
     for (size_t k = 0; k < BRUTE_RUNS / drawn->runs; k++) {
-        double place[VARIABLES], objective, constraint, whole;
+        double at[VARIABLES], objective, constraint, whole;
         for (size_t j = 0; j < drawn->variables; j++)
-            place[j] = modf(0.5 + (double)k * pow(root, -(double)(j + 1)), &whole);
-        evaluate(drawn, place, workspace, &objective, &constraint);
+            at[j] = value_at(drawn, j, modf(0.5 + (double)k * pow(root, -(double)(j + 1)), &whole));
+        evaluate(drawn, at, workspace, &objective, &constraint);
         if (is_feasible(drawn, constraint) && objective < best)
             best = objective;
     }
@@ -248,7 +252,7 @@ static void request_make(const Drawn *drawn, StudyRequest *request, Problem *pro
     if (drawn->excitation == DRAWN_RANDOM)
         study->over.runs = drawn->runs;
     if (drawn->aggregate.is_max)
-        study->statistic.of = strdup("max");
+        study->statistic.of = OPTIMIZE_MAX;
     study->statistic.quantile = drawn->aggregate.quantile;
     study->variables.at = calloc(drawn->variables, sizeof *study->variables.at);
     for (size_t j = 0; j < drawn->variables; j++)
@@ -297,16 +301,13 @@ static void compare(Compared *compared, bool is_repeated, Workspace *workspace) 
     compared->cpu_alone = -thread_cpu();
     for (size_t i = 0; i < optimum->history.count; i++) {
         const OptimumCandidate *candidate = &optimum->history.at[i];
-        double place[VARIABLES], objective, constraint;
-        for (size_t j = 0; j < drawn->variables; j++) {
-            const size_t v = drawn->variable[j];
-            place[j] = (strtod(candidate->values.at[j].value, NULL) - lowest[v]) /
-                       (highest[v] - lowest[v]);
-        }
-        evaluate(drawn, place, workspace, &objective, &constraint);
-        const double error = objective / candidate->objectives.at[0] - 1;
-        if (is_feasible(drawn, constraint) != candidate->feasible || !(fabs(error) < 1e-6))
-            compared->is_kept = compared->is_kept && fabs(error) < 0.05; // chaos at the last digit
+        double at[VARIABLES], objective, constraint;
+        for (size_t j = 0; j < drawn->variables; j++)
+            at[j] = strtod(candidate->values.at[j].value, NULL);
+        evaluate(drawn, at, workspace, &objective, &constraint);
+        if (is_feasible(drawn, constraint) != candidate->feasible ||
+            objective != candidate->objectives.at[0])
+            compared->is_kept = false;
         if (candidate->feasible)
             compared->found = fmin(compared->found, candidate->objectives.at[0]);
     }

@@ -85,6 +85,25 @@ static double rms_at(const StudyRequest *request, double clearance) {
     return rms;
 }
 
+// Every candidate within all intervals of the region is within 2 % of the best.
+static void assert_region(const Optimum *optimum) {
+    const double best = optimum->best.objectives.at[0].value;
+    size_t inside = 0;
+    for (size_t i = 0; i < optimum->history.count; i++) {
+        const OptimumCandidate *candidate = &optimum->history.at[i];
+        bool is_inside = true;
+        for (size_t j = 0; j < optimum->region.count; j++) {
+            const double value = strtod(candidate->values.at[j].value, NULL);
+            is_inside = is_inside && value >= optimum->region.at[j].low &&
+                        value <= optimum->region.at[j].high;
+        }
+        inside += is_inside;
+        if (is_inside)
+            assert_true(candidate->feasible && candidate->objectives.at[0] <= 1.02 * best);
+    }
+    assert_true(inside > 1);
+}
+
 TEST(the_best_clearance_is_that_of_a_fine_sweep) {
     StudyRequest request = request_make(50);
     variable_add(&request, "/dampers/0/clearance", 0.005, 0.04);
@@ -94,7 +113,7 @@ TEST(the_best_clearance_is_that_of_a_fine_sweep) {
     for (size_t i = 0; i <= 500; i++)
         least = fmin(least, rms_at(&request, 0.005 + 0.035 * (double)i / 500));
     assert_int_equal(optimum->candidates, 50);
-    assert_int_equal(optimum->runs, 52);
+    assert_int_equal(optimum->made.runs, 52);
     assert_int_equal(optimum->history.count, 50);
     assert_true(optimum->best.feasible && optimum->best.metrics.rms_displacement < 1.003 * least);
     assert_true(optimum->best.objectives.at[0].value == optimum->best.metrics.rms_displacement);
@@ -104,8 +123,10 @@ TEST(the_best_clearance_is_that_of_a_fine_sweep) {
     assert_true(optimum->undamped.metrics.rms_displacement >
                 optimum->given.metrics.rms_displacement);
     assert_true(optimum->undamped.metrics.impacts == 0);
-    assert_string_equal(optimum->region.at[0].pointer, "/dampers/0/clearance");
+    assert_string_equal(optimum->region.at[0].member.pointer, "/dampers/0/clearance");
+    assert_region(optimum);
     assert_true(optimum->region.at[0].low <= clearance && optimum->region.at[0].high >= clearance);
+    assert_true(optimum->region.at[0].low < optimum->region.at[0].high);
     for (size_t i = 0; i < optimum->rivals.count; i++) {
         const double other = strtod(optimum->rivals.at[i].values.at[0].value, NULL);
         assert_true(optimum->rivals.at[i].difference >= 0 && fabs(other - clearance) >= 0.0035);
@@ -161,6 +182,7 @@ TEST(candidates_share_seeds_and_a_repeated_run_gives_the_same_bytes) {
                 sum += rms_at(&request, 0.015) / 4;
             }
             assert_true(fabs(optimum->given.metrics.rms_displacement / sum - 1) < 1e-12);
+            assert_region(optimum);
         }
         end(&(StudyRequest){0}, optimum);
     }
@@ -184,6 +206,30 @@ TEST(two_objectives_give_a_front_in_its_order) {
         const double *after = optimum->front.at[i].objectives.at;
         assert_true(before[0] < after[0] && before[1] > after[1]);
     }
+    end(&request, optimum);
+}
+
+TEST(tied_members_are_all_named_and_variables_without_effect_cause_a_warning) {
+    StudyRequest request = request_make(8);
+    static const char *const tied[] = {"/dampers/0/clearance", "/dampers/0/mass"};
+    StudyAxis *axis = variable_add(&request, tied[0], 0.02, 0.03);
+    free(axis->pointer);
+    axis->pointer = NULL;
+    axis->pointers = texts_of(2, tied);
+    study_of(&request)->objectives.at[0].metric = 0; // peak_displacement: that of the start
+    complete(&request);
+    Optimum *optimum = run(&request);
+    const StudyMember *members[] = {&optimum->best.values.at[0].member,
+                                    &optimum->history.at[3].values.at[0].member,
+                                    &optimum->region.at[0].member};
+    for (size_t i = 0; i < COUNT(members); i++) {
+        assert_string_equal(members[i]->pointer, tied[0]);
+        assert_int_equal(members[i]->pointers.count, 2);
+        assert_string_equal(members[i]->pointers.at[1], tied[1]);
+    }
+    const Warnings *warnings = &optimum->made.warnings;
+    assert_true(warnings->count > 0);
+    assert_non_null(strstr(warnings->at[warnings->count - 1].detail, "the same objective"));
     end(&request, optimum);
 }
 
@@ -212,8 +258,8 @@ TEST(constraints_that_none_keeps_are_named_and_the_best_is_absent) {
     Optimum *optimum = run(&request);
     assert_true(optimum->best.values.count == 0 && optimum->best.objectives.count == 0);
     assert_true(field_is_absent(fields_find(study_optimize.answer->fields, "best", NULL), optimum));
-    assert_int_equal(optimum->warnings.count, 1);
-    assert_non_null(strstr(optimum->warnings.at[0].detail, "peak_"));
+    assert_int_equal(optimum->made.warnings.count, 1);
+    assert_non_null(strstr(optimum->made.warnings.at[0].detail, "peak_"));
     for (size_t i = 0; i < 20; i++)
         assert_false(optimum->history.at[i].feasible);
     StudyValue values[1];
@@ -238,10 +284,10 @@ TEST(candidates_whose_runs_fail_are_counted_and_infeasible) {
         assert_true(candidate->feasible == (2 * strtod(candidate->values.at[1].value, NULL) <=
                                             strtod(candidate->values.at[0].value, NULL)));
     }
-    assert_true(infeasible > 0 && optimum->failed == infeasible && optimum->best.feasible);
-    assert_int_equal(optimum->failures.count, 1);
-    assert_string_equal(optimum->failures.at[0].reason, "invalid-scene");
-    assert_int_equal(optimum->failures.at[0].count, infeasible);
+    assert_true(infeasible > 0 && optimum->made.failed == infeasible && optimum->best.feasible);
+    assert_int_equal(optimum->made.failures.count, 1);
+    assert_string_equal(optimum->made.failures.at[0].reason, "invalid-scene");
+    assert_int_equal(optimum->made.failures.at[0].count, infeasible);
     end(&request, optimum);
 }
 
@@ -268,10 +314,26 @@ TEST(senseless_requests_are_refused_where_they_are_wrong) {
     study_of(&request)->over.runs = 4;
     assert_non_null(strstr(refusal(&request, "/study/over/runs"), "random"));
     study_of(&request)->over.runs = COUNT_ABSENT;
-    study_of(&request)->statistic.of = strdup("median");
-    assert_non_null(strstr(refusal(&request, "/study/statistic"), "quantile"));
-    free(study_of(&request)->statistic.of);
-    study_of(&request)->statistic.of = NULL;
+    study_of(&request)->statistic.of = OPTIMIZE_QUANTILE;
+    assert_non_null(strstr(refusal(&request, "/study/statistic"), "mean"));
+    study_of(&request)->statistic.of = OPTIMIZE_MAX;
+    assert_non_null(strstr(refusal(&request, "/study/statistic"), "/study/over"));
+    study_of(&request)->statistic.quantile = 0.5;
+    assert_non_null(strstr(refusal(&request, "/study/statistic"), "both"));
+    study_of(&request)->statistic = (OptimizeStatistic){CHOICE_ABSENT, (double)NAN};
+    study_of(&request)->over.runs = 0;
+    assert_non_null(strstr(refusal(&request, "/study/over"), "needs runs, or records"));
+    study_of(&request)->over.runs = COUNT_ABSENT;
+    PinnedRecords *records = &study_of(&request)->over.records;
+    study_of(&request)->over.runs = 0;
+    records->at = calloc(2, sizeof *records->at);
+    assert_non_null(records->at);
+    for (; records->count < 2; records->count++)
+        records->at[records->count].name = strdup("quake");
+    assert_non_null(strstr(refusal(&request, "/study/over/records/0"), "not loaded"));
+    assert_non_null(strstr(refusal(&request, "/study/over/records/1"), "twice"));
+    fields_clear(fields_find(study_optimize.kind.fields, "over", NULL)->fields,
+                 &study_of(&request)->over);
     constraint_add(&request, 0, (double)NAN, (double)NAN);
     assert_non_null(strstr(refusal(&request, "/study/constraints/0"), "min"));
     study_of(&request)->constraints.at[0].min = 2;
@@ -283,5 +345,23 @@ TEST(senseless_requests_are_refused_where_they_are_wrong) {
     assert_non_null(strstr(refusal(&request, "/study/objectives/1/metric"), "another"));
     study_of(&request)->objectives.count = 1;
     complete(&request);
+    end(&request, NULL);
+}
+
+TEST(variables_that_the_seeds_or_records_of_the_runs_replace_are_refused) {
+    StudyRequest request = request_random(20, 2);
+    variable_add(&request, "/excitation/seed", 1, 100);
+    assert_non_null(strstr(refusal(&request, "/study/variables/2"), "/study/over"));
+    StudyAxis *axis = &study_of(&request)->variables.at[2];
+    free(axis->pointer);
+    axis->pointer = strdup("/excitation/rms");
+    complete(&request);
+    study_of(&request)->over.runs = 0;
+    study_of(&request)->over.first_seed = COUNT_ABSENT;
+    PinnedRecords *records = &study_of(&request)->over.records;
+    records->at = calloc(1, sizeof *records->at);
+    assert_non_null(records->at);
+    records->at[records->count++].name = strdup("quake");
+    assert_non_null(strstr(refusal(&request, "/study/variables/2"), "/excitation/rms"));
     end(&request, NULL);
 }

@@ -11,13 +11,13 @@ typedef void Function(const double *point, double *results);
 static Search *search_run(const SearchSpace *space, Function *function, size_t pending) {
     Search *search;
     assert_int_equal(search_new(space, &search), STATUS_OK);
-    while (search_added(search) < search_candidates(search)) {
-        const size_t until = search_added(search) + pending;
-        while (search_proposed(search) < search_candidates(search) &&
-               (search_proposed(search) < search_sample(search) || search_proposed(search) < until))
+    while (search->added < search->space.candidates) {
+        const size_t until = search->added + pending;
+        while (search->proposed < search->space.candidates &&
+               (search->proposed < search->sample || search->proposed < until))
             assert_int_equal(search_propose(search), STATUS_OK);
         double results[SEARCH_OBJECTIVES + SEARCH_CONSTRAINTS];
-        function(search_point(search, search_added(search)), results);
+        function(search_point(search, search->added), results);
         search_add(search, results);
     }
     return search;
@@ -103,7 +103,7 @@ TEST(failed_candidates_are_infeasible_and_avoided) {
     const SearchSpace space = {.variables = 2, .objectives = 1, .candidates = 60, .seed = 1};
     Search *search = search_run(&space, failing, 1);
     size_t failed = 0;
-    for (size_t i = search_sample(search); i < 60; i++)
+    for (size_t i = search->sample; i < 60; i++)
         failed += search_violation(search, i) == (double)INFINITY;
     assert_true(failed < 15 && best_of(search) < 0.41);
     search_free(search);
@@ -137,9 +137,6 @@ TEST(choices_with_and_without_order_are_found_beside_numbers) {
     Search *search = search_run(&space, mixed, 1);
     const double *best = search_point(search, search_best(search, 0));
     assert_true(best[0] == 3 && best[2] == 4 && fabs(best[1] - 0.7) < 0.05);
-    double low, high;
-    assert_int_equal(search_region(search, search_best(search, 0), 0, 0.1, &low, &high), STATUS_OK);
-    assert_true(isnan(low) && isnan(high));
     search_free(search);
 }
 
@@ -151,30 +148,13 @@ TEST(few_combinations_are_all_tried_once) {
                                .seed = 1};
     Search *search = search_run(&space, mixed, 1);
     bool is_tried[6][9] = {{false}};
-    assert_int_equal(search_candidates(search), 54);
+    assert_int_equal(search->space.candidates, 54);
     for (size_t i = 0; i < 54; i++) {
         const double *point = search_point(search, i);
         bool *tried = &is_tried[(size_t)point[0]][(size_t)point[2]];
         assert_true(!*tried && point[1] == 0);
         *tried = true;
     }
-    search_free(search);
-}
-
-static void bowl(const double *point, double *results) {
-    results[0] = 1 + 4 * (point[0] - 0.4) * (point[0] - 0.4) + (point[1] - 0.9) * (point[1] - 0.9);
-}
-
-TEST(the_region_of_a_quadratic_function_is_known) {
-    const SearchSpace space = {.variables = 2, .objectives = 1, .candidates = 50, .seed = 1};
-    Search *search = search_run(&space, bowl, 1);
-    const size_t best = search_best(search, 0);
-    double low, high;
-    assert_true(best_of(search) < 1.0005);
-    assert_int_equal(search_region(search, best, 0, 0.02, &low, &high), STATUS_OK);
-    assert_true(fabs(low - (0.4 - sqrt(0.005))) < 0.03 && fabs(high - (0.4 + sqrt(0.005))) < 0.03);
-    assert_int_equal(search_region(search, best, 1, 0.02, &low, &high), STATUS_OK);
-    assert_true(fabs(low - (0.9 - sqrt(0.02))) < 0.04 && high == 1);
     search_free(search);
 }
 
