@@ -77,7 +77,7 @@ def test_two_objectives_and_constraints_that_none_keeps():
         answer = daemon.get(f"/v1/results/{result}/optimum.json").json()
         assert answer["front"] and answer["best"] and not answer["rivals"]
         assert tree.fromstring(daemon.get(f"/v1/results/{result}/optimum.svg").body).tag.endswith("svg")
-        none = asked(constraints=[{"metric": "peak_displacement", "max": 0.001}], statistic="max")
+        none = asked(constraints=[{"metric": "peak_displacement", "max": 0.001}])
         result = program.finished(daemon, none)["result"]
         answer = daemon.get(f"/v1/results/{result}/optimum.json").json()
         assert answer["best"] is None and "peak_displacement" in answer["warnings"][0]["detail"]
@@ -92,6 +92,10 @@ def test_faults_have_the_pointers_of_the_request():
                                 ({"variables": [{"pointer": "/dampers/0/buffer", "values": ["spunge"]}]}, "/study/variables/0/values/0"),
                                 ({"objectives": []}, "/study/objectives"),
                                 ({"statistic": "median"}, "/study/statistic"),
+                                ({"statistic": "max"}, "/study/statistic"),
+                                ({"statistic": {}}, "/study/statistic"),
+                                ({"over": {}}, "/study/over"),
+                                ({"over": {"records": []}}, "/study/over"),
                                 ({"over": {"runs": 4}}, "/study/over/runs"),
                                 ({"over": {"records": ["none"]}}, "/study/over/records/0/name"),
                                 ({"max_candidates": 1}, "/study/max_candidates")):

@@ -38,8 +38,8 @@ TEST(a_word_of_a_candidate_is_the_text_itself) {
     char near[] = "0.01", far[] = "2e-2", sponge[] = "\"sponge@1\"",
          rubber[] = "\"rubber, soft@2\"";
     OptimumValue values[2][2] = {
-        {{.pointer = clearance, .value = near}, {.pointer = buffer, .value = sponge}},
-        {{.pointer = clearance, .value = far}, {.pointer = buffer, .value = rubber}}};
+        {{.member.pointer = clearance, .value = near}, {.member.pointer = buffer, .value = sponge}},
+        {{.member.pointer = clearance, .value = far}, {.member.pointer = buffer, .value = rubber}}};
     double rms[] = {0.003};
     OptimumCandidate history[] = {
         {.index = 0, .values = {values[0], 2}, .objectives = {rms, 1}, .feasible = true},
