@@ -27,7 +27,8 @@ enum {
     PENDING_RUNS = 16,
     VALUES_CHECKED = 256, // of a list, with the request
     COST_SAMPLES = 16,
-    GROUPS_BEFORE = 2, // given and undamped
+    UNDAMPED = 1,      // group of runs; 0: the given scene
+    GROUPS_BEFORE = 2, // the first one of a candidate
     RIVALS = 5,
 };
 
@@ -115,7 +116,7 @@ static const Field optimum_rival_fields[] = {
     FIELD_END
 };
 
-const Field optimum_candidate_fields[] = {
+static const Field optimum_candidate_fields[] = {
     FIELD_COUNT(OptimumCandidate, index, NULL, AT_MIN(0), OPTIONAL, "number of the candidate, from 0"),
     FIELD_LIST(OptimumCandidate, values, optimum_value_fields, 0, PRESENCE_DEFAULT, "of the variables"),
     FIELD_REALS_OR_NULL(OptimumCandidate, objectives, NULL, "its objectives; null: a run has failed"),
@@ -148,20 +149,6 @@ static size_t optimize_runs(const OptimizeStudy *study) {
                                            : 1;
 }
 
-// Values that leave those of the scene.
-static void optimize_keep_values(StudyValue *values) {
-    for (size_t j = 0; j < SEARCH_VARIABLES; j++)
-        values[j] = (StudyValue){NULL, (double)NAN};
-}
-
-static void optimize_clear_dampers(Simulation *scene) {
-    Dampers *dampers = &scene->scene.dampers;
-    for (size_t i = 0; i < dampers->count; i++)
-        fields_clear(damper_fields, &dampers->at[i]);
-    free(dampers->at);
-    *dampers = (Dampers){NULL, 0};
-}
-
 // A number that the search makes smaller, or a bound that it keeps, of the metric m:
 // sign (m - bound) / scale.
 typedef struct OptimizeResult {
@@ -187,26 +174,118 @@ typedef struct OptimizeWork {
     double *objectives;      // of every run: candidate by candidate, objective by objective
 } OptimizeWork;
 
-// The scene of given values with the seed or the record of a run.
-static Status optimize_scene_make(const OptimizeWork *work, const StudyValue *values,
-                                  bool has_dampers, size_t run, Simulation *scene,
-                                  Problem *problem) {
+// --- The space of the search, and the scenes of its points ---
+
+// Whether all values are numbers that rise or fall.
+static bool optimize_is_ordered(const StudyAxis *axis) {
+    double number[3] = {0, 0, 0}; // the last ones
+    for (size_t k = 0; k < axis->values.count; k++) {
+        const char *text = axis->values.at[k];
+        char *end;
+        memmove(number, number + 1, 2 * sizeof *number);
+        number[2] = strtod(text, &end);
+        if (*end != '\0' || end == text || (k > 0 && number[2] == number[1]) ||
+            (k > 1 && (number[2] > number[1]) != (number[1] > number[0])))
+            return false;
+    }
+    return true;
+}
+
+// The variables of the search: a range of whole numbers is a choice with an order.
+static Status optimize_variables(const OptimizeWork *work, SearchSpace *space, Problem *problem) {
+    const StudyAxes *axes = &work->study->variables;
+    Simulation scene;
+    Status status = fields_copy(simulation_fields, work->work.simulation, &scene);
+    for (; space->variables < axes->count && status == STATUS_OK; space->variables++) {
+        const StudyAxis *axis = &axes->at[space->variables];
+        const JsonPointer place = json_pointer_at("/study/variables", space->variables);
+        SearchVariable *variable = &space->variable[space->variables];
+        bool is_tag;
+        const Field *field = study_axis_find(axis, &scene, &is_tag, place.at, problem);
+        if (field == NULL)
+            status = STATUS_INVALID;
+        else if (!study_axis_is_range(axis))
+            *variable = (SearchVariable){axis->values.count, optimize_is_ordered(axis)};
+        else if (field->kind == FIELD_KIND_COUNT)
+            *variable =
+                (SearchVariable){(size_t)fmin(floor(axis->to) - ceil(axis->from) + 1, 1e9), true};
+    }
+    simulation_clear(&scene);
+    return status;
+}
+
+static Status optimize_search_new(OptimizeWork *work, Problem *problem) {
+    const OptimizeStudy *study = work->study;
+    SearchSpace space = {.objectives = study->objectives.count,
+                         .candidates = (size_t)study->max_candidates,
+                         .seed = study->search_seed};
+    TRY(optimize_variables(work, &space, problem));
+    for (size_t i = 0; i < study->objectives.count; i++)
+        work->result[work->results++] = (OptimizeResult){
+            study->objectives.at[i].metric,
+            study->objectives.at[i].goal == OPTIMIZE_MAXIMIZE ? -1 : 1, 0, 1, SIZE_MAX};
+    for (size_t i = 0; i < 2 * study->constraints.count; i++) {
+        const OptimizeConstraint *constraint = &study->constraints.at[i / 2];
+        const double bound = i % 2 == 0 ? constraint->min : constraint->max;
+        if (!isnan(bound))
+            work->result[work->results++] =
+                (OptimizeResult){constraint->metric, i % 2 == 0 ? -1 : 1, bound,
+                                 bound != 0 ? fabs(bound) : 1, i / 2};
+    }
+    space.constraints = work->results - space.objectives;
+    return search_new(&space, &work->search);
+}
+
+static StudyValue optimize_value(const OptimizeWork *work, size_t variable, double number) {
+    const StudyAxis *axis = &work->study->variables.at[variable];
+    if (!study_axis_is_range(axis))
+        return study_axis_value(axis, (size_t)number);
+    if (work->search->space.variable[variable].values > 0)
+        return (StudyValue){NULL, ceil(axis->from) + number};
+    const double inside = axis->from + number * (axis->to - axis->from);
+    return (StudyValue){NULL, number == 1 ? axis->to : fmin(inside, axis->to)};
+}
+
+// Of the candidate of a group; NAN, which leaves those of the scene, before the first one.
+static void optimize_values(const OptimizeWork *work, size_t group, StudyValue *values) {
+    for (size_t j = 0; j < work->study->variables.count; j++)
+        values[j] =
+            group < GROUPS_BEFORE
+                ? (StudyValue){NULL, (double)NAN}
+                : optimize_value(work, j, search_point(work->search, group - GROUPS_BEFORE)[j]);
+}
+
+static void optimize_clear_dampers(Simulation *scene) {
+    Dampers *dampers = &scene->scene.dampers;
+    for (size_t i = 0; i < dampers->count; i++)
+        fields_clear(damper_fields, &dampers->at[i]);
+    free(dampers->at);
+    *dampers = (Dampers){NULL, 0};
+}
+
+static Status optimize_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
+                             Problem *problem) {
+    const OptimizeWork *work = of;
     const OptimizeStudy *study = work->study;
     const SimulationLimits *limits = work->work.limits;
+    const size_t group = member / work->runs, run = member % work->runs;
+    const bool has_records = study->over.records.count > 0;
+    StudyValue values[SEARCH_VARIABLES];
+    (void)part;
+    optimize_values(work, group, values);
     TRY(study_scene_make(work->work.simulation, &study->variables, values, &study->names, true,
                          limits, scene, problem));
     study_run_fix_solver(scene);
-    for (size_t i = 0; i < work->results && has_dampers; i++)
+    for (size_t i = 0; i < work->results && group != UNDAMPED; i++)
         scene->output.reduction |= study_metric_is_reduction(work->result[i].metric);
     if (optimize_has_seeds(study))
         ((ExcitationRandom *)(void *)scene->scene.excitation)->seed = study->over.first_seed + run;
-    if (study->over.records.count > 0)
+    if (has_records)
         TRY(study_scene_use_record(scene, &study->over.records.at[run]));
-    if (!has_dampers)
+    if (group == UNDAMPED)
         optimize_clear_dampers(scene);
-    return has_dampers && study->over.records.count == 0
-               ? STATUS_OK
-               : simulation_complete(scene, limits, NULL, problem);
+    return has_records || group == UNDAMPED ? simulation_complete(scene, limits, NULL, problem)
+                                            : STATUS_OK;
 }
 
 // --- The request ---
@@ -216,28 +295,18 @@ static Status optimize_check_metric(const Simulation *simulation, int metric, co
     return study_metric_check(simulation, metric, json_pointer_of(place, "metric").at, problem);
 }
 
-static Status optimize_check_objectives(const OptimizeStudy *study, const Simulation *simulation,
-                                        Problem *problem) {
-    static const char place[] = "/study/objectives";
-    const OptimizeObjectives *objectives = &study->objectives;
+static Status optimize_check_metrics(const OptimizeStudy *study, const Simulation *simulation,
+                                     Problem *problem) {
     Status status = STATUS_OK;
-    if (objectives->count == 0)
-        status = problem_add(problem, STATUS_INVALID, place,
-                             "must have one objective, or two for a front");
-    for (size_t i = 0; i < objectives->count; i++) {
-        const JsonPointer own = json_pointer_at(place, i);
-        status = study_first_failure(
-            status, optimize_check_metric(simulation, objectives->at[i].metric, own.at, problem));
-        if (i > 0 && objectives->at[i].metric == objectives->at[0].metric)
+    for (size_t i = 0; i < study->objectives.count; i++) {
+        const int metric = study->objectives.at[i].metric;
+        const JsonPointer own = json_pointer_at("/study/objectives", i);
+        status =
+            study_first_failure(status, optimize_check_metric(simulation, metric, own.at, problem));
+        if (i > 0 && metric == study->objectives.at[0].metric)
             status = json_pointer_fault(problem, own.at, "metric",
                                         "is that of the first objective: give another one");
     }
-    return status;
-}
-
-static Status optimize_check_constraints(const OptimizeStudy *study, const Simulation *simulation,
-                                         Problem *problem) {
-    Status status = STATUS_OK;
     for (size_t i = 0; i < study->constraints.count; i++) {
         const OptimizeConstraint *constraint = &study->constraints.at[i];
         const JsonPointer own = json_pointer_at("/study/constraints", i);
@@ -325,15 +394,16 @@ static Status optimize_complete_over(OptimizeStudy *study, const Simulation *sim
         return problem_add(problem, STATUS_INVALID, "/study/over/first_seed",
                            "is too large for %llu runs: seeds end at 2^53 - 1",
                            (unsigned long long)over->runs);
+    Status status =
+        study_first_failure(study_suite_check(&over->records, "/study/over/records", problem),
+                            optimize_check_overwritten(
+                                study, excitation_kind(excitation) == &excitation_record, problem));
     for (size_t i = 0; i < over->records.count; i++)
         if (over->records.at[i].named == NULL)
-            return problem_add(problem, STATUS_INVALID,
-                               json_pointer_at("/study/over/records", i).at,
-                               "is a record that is not loaded");
-    return study_first_failure(
-        study_suite_check(&over->records, "/study/over/records", problem),
-        optimize_check_overwritten(study, excitation_kind(excitation) == &excitation_record,
-                                   problem));
+            status =
+                problem_add(problem, STATUS_INVALID, json_pointer_at("/study/over/records", i).at,
+                            "is a record that is not loaded");
+    return status;
 }
 
 // Where end or value `index` of one variable alone, in the given scene, makes an invalid scene.
@@ -348,7 +418,7 @@ static Status optimize_check_value(const OptimizeStudy *study, const Simulation 
                                   : json_pointer_at(json_pointer_of(own.at, "values").at, index);
     StudyValue values[SEARCH_VARIABLES];
     Simulation scene;
-    optimize_keep_values(values);
+    optimize_values(&(OptimizeWork){.study = study}, 0, values);
     values[variable] = is_range ? (StudyValue){NULL, index == 0 ? axis->from : axis->to}
                                 : study_axis_value(axis, index);
     problem_clear(scratch);
@@ -391,10 +461,12 @@ static Status optimize_complete(void *request, const Simulation *simulation,
     static const char place[] = "/study/variables";
     if (study->variables.count == 0)
         return problem_add(problem, STATUS_INVALID, place, "must have at least one variable");
+    if (study->objectives.count == 0)
+        return problem_add(problem, STATUS_INVALID, "/study/objectives",
+                           "must have one objective, or two for a front");
     const Status all[] = {
         study_axes_check(&study->variables, false, place, problem),
-        optimize_check_objectives(study, simulation, problem),
-        optimize_check_constraints(study, simulation, problem),
+        optimize_check_metrics(study, simulation, problem),
         optimize_check_statistic(study, problem),
         optimize_complete_over(study, simulation, problem),
         optimize_check_runs(study, problem),
@@ -404,12 +476,11 @@ static Status optimize_complete(void *request, const Simulation *simulation,
     TRY(optimize_check_values(study, simulation, limits, problem));
     TRY(status_first(all, COUNT(all)));
     const OptimizeWork work = {.study = study,
-                               .work = {.simulation = simulation, .limits = limits}};
-    StudyValue values[SEARCH_VARIABLES];
-    optimize_keep_values(values);
+                               .work = {.simulation = simulation, .limits = limits},
+                               .runs = optimize_runs(study)};
     for (size_t i = 0; i < study->over.records.count; i++) {
         Simulation scene;
-        const Status status = optimize_scene_make(&work, values, true, i, &scene, problem);
+        const Status status = optimize_scene(&work, i, &scene, NULL, problem);
         simulation_clear(&scene);
         TRY(status);
     }
@@ -423,98 +494,6 @@ static void optimize_references(void *request, StudyReferences *references) {
                                     .names = &study->names,
                                     .suite = &study->over.records,
                                     .suite_place = "/study/over/records"};
-}
-
-// --- The space of the search ---
-
-// Whether all values are numbers that rise or fall.
-static bool optimize_is_ordered(const StudyAxis *axis) {
-    double last = 0, direction = 0;
-    for (size_t k = 0; k < axis->values.count; k++) {
-        char *end;
-        const double number = strtod(axis->values.at[k], &end);
-        const double step = k > 0 ? number - last : 0;
-        if (*end != '\0' || end == axis->values.at[k] || step * direction < 0 ||
-            (k > 0 && step == 0))
-            return false;
-        direction = step;
-        last = number;
-    }
-    return true;
-}
-
-// The variables of the search: a range of whole numbers is a choice with an order.
-static Status optimize_variables(const OptimizeWork *work, SearchSpace *space, Problem *problem) {
-    const StudyAxes *axes = &work->study->variables;
-    Simulation scene;
-    Status status = fields_copy(simulation_fields, work->work.simulation, &scene);
-    for (; space->variables < axes->count && status == STATUS_OK; space->variables++) {
-        const StudyAxis *axis = &axes->at[space->variables];
-        const JsonPointer place = json_pointer_at("/study/variables", space->variables);
-        SearchVariable *variable = &space->variable[space->variables];
-        bool is_tag;
-        const Field *field = study_axis_find(axis, &scene, &is_tag, place.at, problem);
-        if (field == NULL)
-            status = STATUS_INVALID;
-        else if (!study_axis_is_range(axis))
-            *variable = (SearchVariable){axis->values.count, optimize_is_ordered(axis)};
-        else if (field->kind == FIELD_KIND_COUNT)
-            *variable =
-                (SearchVariable){(size_t)fmin(floor(axis->to) - ceil(axis->from) + 1, 1e9), true};
-    }
-    simulation_clear(&scene);
-    return status;
-}
-
-static Status optimize_search_new(OptimizeWork *work, Problem *problem) {
-    const OptimizeStudy *study = work->study;
-    SearchSpace space = {.objectives = study->objectives.count,
-                         .candidates = (size_t)study->max_candidates,
-                         .seed = study->search_seed};
-    TRY(optimize_variables(work, &space, problem));
-    for (size_t i = 0; i < study->objectives.count; i++)
-        work->result[work->results++] = (OptimizeResult){
-            study->objectives.at[i].metric,
-            study->objectives.at[i].goal == OPTIMIZE_MAXIMIZE ? -1 : 1, 0, 1, SIZE_MAX};
-    for (size_t i = 0; i < 2 * study->constraints.count; i++) {
-        const OptimizeConstraint *constraint = &study->constraints.at[i / 2];
-        const double bound = i % 2 == 0 ? constraint->min : constraint->max;
-        if (!isnan(bound))
-            work->result[work->results++] =
-                (OptimizeResult){constraint->metric, i % 2 == 0 ? -1 : 1, bound,
-                                 bound != 0 ? fabs(bound) : 1, i / 2};
-    }
-    space.constraints = work->results - space.objectives;
-    return search_new(&space, &work->search);
-}
-
-static StudyValue optimize_value(const OptimizeWork *work, size_t variable, double number) {
-    const StudyAxis *axis = &work->study->variables.at[variable];
-    if (!study_axis_is_range(axis))
-        return study_axis_value(axis, (size_t)number);
-    if (work->search->space.variable[variable].values > 0)
-        return (StudyValue){NULL, ceil(axis->from) + number};
-    const double inside = axis->from + number * (axis->to - axis->from);
-    return (StudyValue){NULL, number == 1 ? axis->to : fmin(inside, axis->to)};
-}
-
-static void optimize_values(const OptimizeWork *work, size_t candidate, StudyValue *values) {
-    for (size_t j = 0; j < work->study->variables.count; j++)
-        values[j] = optimize_value(work, j, search_point(work->search, candidate)[j]);
-}
-
-// --- The runs ---
-
-static Status optimize_scene(const void *of, size_t member, Simulation *scene, StudyPart *part,
-                             Problem *problem) {
-    const OptimizeWork *work = of;
-    const size_t group = member / work->runs;
-    StudyValue values[SEARCH_VARIABLES];
-    (void)part;
-    optimize_keep_values(values);
-    if (group >= GROUPS_BEFORE)
-        optimize_values(work, group - GROUPS_BEFORE, values);
-    return optimize_scene_make(work, values, group != 1, member % work->runs, scene, problem);
 }
 
 // Proposes candidates as long as no more than `pending` of the model are without results.
@@ -568,7 +547,7 @@ static Status optimize_close(OptimizeWork *work, size_t group) {
     }
     if (group >= GROUPS_BEFORE)
         return optimize_close_candidate(work, group - GROUPS_BEFORE, &metrics);
-    *(group == 0 ? &work->answer->given : &work->answer->undamped) = (OptimumScene){metrics};
+    *(group == UNDAMPED ? &work->answer->undamped : &work->answer->given) = (OptimumScene){metrics};
     return STATUS_OK;
 }
 
@@ -627,7 +606,7 @@ static Status optimize_begin(void *of, const StudyTools *tools, Problem *problem
 static Status optimum_put_values(const OptimizeWork *work, size_t candidate,
                                  OptimumValues *target) {
     StudyValue values[SEARCH_VARIABLES];
-    optimize_values(work, candidate, values);
+    optimize_values(work, GROUPS_BEFORE + candidate, values);
     for (size_t j = 0; j < work->study->variables.count; j++) {
         OptimumValue *value = list_append(target, sizeof *value);
         TRY(status_made(value != NULL));
@@ -884,15 +863,14 @@ static Status optimize_end(void *of, const StudyTools *tools, Problem *problem) 
 
 static Status optimize_sample_scene(const void *of, size_t candidate,
                                     const SimulationLimits *limits, Simulation *scene) {
-    StudyValue values[SEARCH_VARIABLES];
-    (void)limits;
-    optimize_values(of, candidate, values);
-    return optimize_scene_make(of, values, true, 0, scene, NULL);
+    (void)limits; // the work has them
+    return optimize_scene(of, GROUPS_BEFORE + candidate, scene, NULL, NULL);
 }
 
 static Status optimize_cost(const void *request, const Simulation *simulation,
                             const SimulationLimits *limits, double *steps) {
-    OptimizeWork work = {.study = request, .work = {.simulation = simulation, .limits = limits}};
+    OptimizeWork work = {
+        .study = request, .work = {.simulation = simulation, .limits = limits}, .runs = 1};
     TRY(optimize_search_new(&work, NULL));
     Search *search = work.search;
     const double candidates = (double)search->space.candidates;

@@ -125,7 +125,6 @@ typedef struct OptimumCandidates {
     OptimumCandidate *at;
     size_t count;
 } OptimumCandidates;
-extern const Field optimum_candidate_fields[];
 
 // The answer.
 typedef struct Optimum {
