@@ -15,7 +15,7 @@
 
 #include "core/base/json_pointer.h"
 #include "core/math/linear_system.h"
-#include "core/study/periodic_orbit.h"
+#include "core/solve/cycle_flow.h"
 #include "core/study/sweep.h"
 
 enum {

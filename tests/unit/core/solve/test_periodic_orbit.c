@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "core/excitation/excitation.h"
-#include "core/study/periodic_orbit.h"
+#include "core/solve/cycle_flow.h"
 #include "tests/support/flows.h"
 #include "tests/support/paper.h"
 #include "tests/support/scenes.h"
