@@ -1,6 +1,13 @@
 // A cycle is one interval of the engine's clock, which starts again with each cycle, so that the
 // return map is the same function in every cycle. Only Taylor steps and steps of power laws are
 // taken: both serve any length.
+//
+// Shooting: an orbit of p cycles is a zero of P(y) - y, where P is the motion over p cycles, found
+// by Newton's method with the matrix P' of the linearised motion; its eigenvalues are the Floquet
+// multipliers (Parker and Chua 1989, chapters 3 and 5). Where contact parameters depend on the
+// approach speed, P' is by central differences, from a section where all masses are in flight. A
+// mass that touches no stop is free to stand anywhere: P' then has the multiplier 1, and the
+// smallest step that solves the equations is taken.
 #include "core/solve/cycle_flow.h"
 
 #include <float.h>
@@ -13,6 +20,15 @@
 #include "core/solve/simd_kernels.h"
 
 enum { PARTS = 16 }; // of a cycle, at which the section may be
+enum { NEWTON_STEPS = 20, FIRST_TRY = 4, WARM_UP = 8, PATIENCE = 9 };
+
+static const double CLOSED = 1e-13; // change by the map at an orbit
+static const double CLOSE = 1e-8;   // a step so small ends at the orbit, but for its square
+static const double RETURNED[] = {1e-3, 1e-2}, MOVED[] = {0.05, 0.3}; // while settling, at its end
+static const double DIFFERENCE = 1e-6;
+static const double STABLE = 1 + 1e-6; // largest multiplier of an orbit that was approached
+static const double FARTHEST = 10;     // change by the map
+static const double RIDGE = 1e-12;
 
 struct CycleFlow {
     EventEngine engine;
@@ -21,10 +37,14 @@ struct CycleFlow {
     Response response;
     Base base;
     Plan *plan;
+    Problem *problem;
     double period; // [s]
     int part;      // of the cycle, at which the section is
     double *kept;  // q and p
     DamperState *kept_dampers;
+    Orbit orbit;
+    double *step, *columns, *left, *history, *first;
+    double *block;
 };
 
 void cycle_flow_free(CycleFlow *flow) {
@@ -34,7 +54,7 @@ void cycle_flow_free(CycleFlow *flow) {
     event_engine_clear(&flow->engine);
     response_clear(&flow->response);
     plan_free(flow->plan);
-    free(flow->kept);
+    free(flow->block);
     free(flow->kept_dampers);
     free(flow);
 }
@@ -46,8 +66,8 @@ static double cycle_flow_origin(const DamperState *damper) {
                : modal_state_sign((Side)damper->origin) * damper->plan->clearance / 2;
 }
 
-size_t cycle_flow_size(const CycleFlow *flow) {
-    return flow->linearised.size;
+Orbit *cycle_flow_orbit(CycleFlow *flow) {
+    return &flow->orbit;
 }
 
 void cycle_flow_get(const CycleFlow *flow, double *y) {
@@ -57,21 +77,9 @@ void cycle_flow_get(const CycleFlow *flow, double *y) {
         y[2 * state->mode_count + d] += cycle_flow_origin(&state->damper[d]);
 }
 
-void cycle_flow_set(CycleFlow *flow, const double *y) {
-    ModalState *state = &flow->engine.state;
-    const size_t n = state->mode_count, m = state->dampers;
-    memcpy(state->q, y, n * sizeof *y);
-    memcpy(state->p, y + n, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
-        DamperState *damper = &state->damper[d];
-        if (damper->phase == PHASE_RESTING)
-            continue;
-        damper->r = y[2 * n + d] - cycle_flow_origin(damper);
-        damper->w = y[2 * n + m + d];
-    }
-}
-
-void cycle_flow_scales(const CycleFlow *flow, double *scales) {
+// The scales of the present state.
+static void cycle_flow_scale(CycleFlow *flow) {
+    double *scales = flow->orbit.scales;
     const ModalState *state = &flow->engine.state;
     const size_t n = state->mode_count, m = state->dampers;
     const double omega = 2 * 3.14159265358979323846 / flow->period;
@@ -99,12 +107,24 @@ void cycle_flow_keep(CycleFlow *flow) {
     memcpy(flow->kept_dampers, state->damper, state->dampers * sizeof *state->damper);
 }
 
-void cycle_flow_restore(CycleFlow *flow) {
+void cycle_flow_restore(CycleFlow *flow, const double *y) {
     ModalState *state = &flow->engine.state;
+    const size_t n = state->mode_count, m = state->dampers;
     memcpy(state->q, flow->kept, state->padded * sizeof *flow->kept);
     memcpy(state->p, flow->kept + state->padded, state->padded * sizeof *flow->kept);
-    memcpy(state->damper, flow->kept_dampers, state->dampers * sizeof *state->damper);
+    memcpy(state->damper, flow->kept_dampers, m * sizeof *state->damper);
     modal_state_constrain(state);
+    if (y == NULL)
+        return;
+    memcpy(state->q, y, n * sizeof *y);
+    memcpy(state->p, y + n, n * sizeof *y);
+    for (size_t d = 0; d < m; d++) {
+        DamperState *damper = &state->damper[d];
+        if (damper->phase == PHASE_RESTING)
+            continue;
+        damper->r = y[2 * n + d] - cycle_flow_origin(damper);
+        damper->w = y[2 * n + m + d];
+    }
 }
 
 // Of a mass at rest nothing can change.
@@ -226,6 +246,10 @@ double cycle_flow_period(const CycleFlow *flow) {
     return flow->period;
 }
 
+double cycle_flow_steps(const CycleFlow *flow) {
+    return flow->run.steps;
+}
+
 // The storeys' state becomes the plan's initial one.
 static void cycle_flow_carry_storeys(CycleFlow *flow, const ModalState *from) {
     const size_t n = from->mode_count;
@@ -273,10 +297,29 @@ static Status cycle_flow_make(CycleFlow *flow, const CycleFlow *from, Problem *p
                           &flow->response, problem));
     TRY(linearised_motion_make(&flow->linearised, state, problem));
     state->is_shadow = true;
-    flow->kept = calloc(2 * state->padded, sizeof *flow->kept);
+    const size_t size = flow->orbit.size = flow->linearised.size;
+    Orbit *orbit = &flow->orbit;
+    const SimdArray arrays[] = {
+        {&flow->kept, 2 * state->padded},
+        {&orbit->scales, size},
+        {&orbit->y, size},
+        {&orbit->end, size},
+        {&orbit->matrix, size * size},
+        {&orbit->real, size},
+        {&orbit->imaginary, size},
+        {&flow->step, size},
+        {&flow->columns, size * size},
+        {&flow->left, 2 * size * size + 2 * size},
+        {&flow->history, (CYCLE_FLOW_PERIOD + 1) * size},
+        {&flow->first, size},
+    };
+    flow->block = simd_kernels_allocate(arrays, COUNT(arrays));
     flow->kept_dampers = calloc(state->dampers + 1, sizeof *flow->kept_dampers);
-    if (flow->kept == NULL || flow->kept_dampers == NULL)
+    if (flow->block == NULL || flow->kept_dampers == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the motion");
+    cycle_flow_scale(flow);
+    if (from != NULL && from->orbit.size == size)
+        memcpy(orbit->scales, from->orbit.scales, size * sizeof *orbit->scales);
     if (from != NULL)
         cycle_flow_carry_dampers(flow, &from->engine.state);
     else
@@ -292,6 +335,7 @@ Status cycle_flow_new(const CycleFlowInputs *inputs, const CycleFlow *from, Cycl
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the motion");
     }
     flow->plan = inputs->plan;
+    flow->problem = problem;
     flow->base = inputs->base;
     flow->period = inputs->period;
     flow->plan->sample_rate = 1 / inputs->period;
@@ -314,139 +358,80 @@ Status cycle_flow_new(const CycleFlowInputs *inputs, const CycleFlow *from, Cycl
 
 // --- periodic orbits ---
 
-// Shooting: an orbit of p cycles is a zero of P(y) - y, where P is the motion over p cycles, found
-// by Newton's method with the matrix P' of the linearised motion; its eigenvalues are the Floquet
-// multipliers (Parker and Chua 1989, chapters 3 and 5). Where contact parameters depend on the
-// approach speed, P' is by central differences, from a section where all masses are in flight.
-//
-// A mass that touches no stop is free to stand anywhere: P' then has the multiplier 1, and the
-// smallest step that solves the equations is taken.
-
-enum { NEWTON_STEPS = 20, FIRST_TRY = 4, WARM_UP = 8 };
-
-static const double CLOSED = 1e-13; // change by the map at an orbit
-static const double CLOSE = 1e-8;   // a step so small ends at the orbit, but for its square
-static const double RETURNED[] = {1e-3, 1e-2}, MOVED[] = {0.05, 0.3}; // while settling, at its end
-static const double DIFFERENCE = 1e-6;
-static const double STABLE = 1 + 1e-6; // largest multiplier of an orbit that was approached
-static const double FARTHEST = 10;     // step of Newton's method
-static const double RIDGE = 1e-12;
-
-Status orbit_search_make(OrbitSearch *search, size_t size, size_t max_period) {
-    *search = (OrbitSearch){.size = size, .max_period = max_period};
-    const SimdArray arrays[] = {
-        {&search->scales, size},
-        {&search->y, size},
-        {&search->end, size},
-        {&search->matrix, size * size},
-        {&search->real, size},
-        {&search->imaginary, size},
-        {&search->step, size},
-        {&search->columns, size * size},
-        {&search->left, 2 * size * size},
-        {&search->history, (max_period + 1) * size},
-        {&search->first, size},
-    };
-    search->block = simd_kernels_allocate(arrays, COUNT(arrays));
-    return status_made(search->block != NULL);
+double cycle_flow_radius(const CycleFlow *flow) {
+    return hypot(flow->orbit.real[0], flow->orbit.imaginary[0]);
 }
 
-void orbit_search_clear(OrbitSearch *search) {
-    free(search->block);
-    *search = (OrbitSearch){0};
-}
-
-static Status orbit_search_run(CycleFlow *flow, size_t period, const double *from, double *end) {
-    cycle_flow_restore(flow);
-    cycle_flow_set(flow, from);
-    TRY(cycle_flow_run(flow, period, NULL, 0, NULL));
+// From a state with the contacts that are kept.
+static Status cycle_flow_go(CycleFlow *flow, size_t period, const double *from, double *columns,
+                            double *end) {
+    cycle_flow_restore(flow, from);
+    TRY(cycle_flow_run(flow, period, columns, flow->orbit.size, NULL));
     cycle_flow_get(flow, end);
     return STATUS_OK;
 }
 
-static Status orbit_search_run_differences(OrbitSearch *search, CycleFlow *flow, size_t period) {
-    const size_t n = search->size;
-    double *from = search->left, *ahead = from + n, *behind = ahead + n;
+static Status cycle_flow_difference(CycleFlow *flow, size_t period) {
+    const Orbit *orbit = &flow->orbit;
+    const size_t n = orbit->size;
+    double *from = flow->left, *ahead = from + n, *behind = ahead + n;
     for (size_t i = 0; i < n; i++) {
-        memcpy(from, search->y, n * sizeof *from);
-        from[i] = search->y[i] + DIFFERENCE * search->scales[i];
-        TRY(orbit_search_run(flow, period, from, ahead));
-        from[i] = search->y[i] - DIFFERENCE * search->scales[i];
-        TRY(orbit_search_run(flow, period, from, behind));
+        memcpy(from, orbit->y, n * sizeof *from);
+        from[i] = orbit->y[i] + DIFFERENCE * orbit->scales[i];
+        TRY(cycle_flow_go(flow, period, from, NULL, ahead));
+        from[i] = orbit->y[i] - DIFFERENCE * orbit->scales[i];
+        TRY(cycle_flow_go(flow, period, from, NULL, behind));
         for (size_t k = 0; k < n; k++)
-            search->columns[i * n + k] = (ahead[k] - behind[k]) / (2 * DIFFERENCE);
+            flow->columns[i * n + k] = (ahead[k] - behind[k]) / (2 * DIFFERENCE);
     }
-    return orbit_search_run(flow, period, search->y, search->end);
-}
-
-static Status orbit_search_run_matrix(OrbitSearch *search, CycleFlow *flow, size_t period) {
-    const size_t n = search->size;
-    if (!cycle_flow_is_linearised(flow))
-        return orbit_search_run_differences(search, flow, period);
-    memset(search->columns, 0, n * n * sizeof *search->columns);
-    for (size_t i = 0; i < n; i++)
-        search->columns[i * n + i] = search->scales[i];
-    cycle_flow_restore(flow);
-    cycle_flow_set(flow, search->y);
-    TRY(cycle_flow_run(flow, period, search->columns, n, NULL));
-    cycle_flow_get(flow, search->end);
     return STATUS_OK;
 }
 
 // Largest scaled difference of two states.
-static double orbit_search_distance(const OrbitSearch *search, const double *a, const double *b) {
+static double cycle_flow_distance(const Orbit *orbit, const double *a, const double *b) {
     double most = 0;
-    for (size_t i = 0; i < search->size; i++) {
-        const double difference = fabs(a[i] - b[i]) / search->scales[i];
+    for (size_t i = 0; i < orbit->size; i++) {
+        const double difference = fabs(a[i] - b[i]) / orbit->scales[i];
         most = difference <= most ? most : difference; // NaN counts as the largest
     }
     return most;
 }
 
-double orbit_search_map(OrbitSearch *search, CycleFlow *flow, size_t period, bool has_matrix,
-                        Status *status) {
-    const size_t n = search->size;
-    *status = has_matrix ? orbit_search_run_matrix(search, flow, period)
-                         : orbit_search_run(flow, period, search->y, search->end);
+double cycle_flow_map(CycleFlow *flow, size_t period, bool has_matrix, Status *status) {
+    Orbit *orbit = &flow->orbit;
+    const size_t n = orbit->size;
+    const bool has_columns = has_matrix && cycle_flow_is_linearised(flow);
+    *status = has_matrix && !has_columns ? cycle_flow_difference(flow, period) : STATUS_OK;
+    for (size_t i = 0; i < n * n && has_columns; i++)
+        flow->columns[i] = i % (n + 1) == 0 ? orbit->scales[i % n] : 0;
+    if (*status == STATUS_OK)
+        *status =
+            cycle_flow_go(flow, period, orbit->y, has_columns ? flow->columns : NULL, orbit->end);
     if (*status != STATUS_OK)
         return (double)NAN;
     for (size_t i = 0; i < n && has_matrix; i++)
         for (size_t k = 0; k < n; k++)
-            search->matrix[k * n + i] = search->columns[i * n + k] / search->scales[k];
-    return orbit_search_distance(search, search->end, search->y);
+            orbit->matrix[k * n + i] = flow->columns[i * n + k] / orbit->scales[k];
+    return cycle_flow_distance(orbit, orbit->end, orbit->y);
 }
 
-Status orbit_search_multiply(OrbitSearch *search) {
-    memcpy(search->left, search->matrix, search->size * search->size * sizeof *search->left);
+Status cycle_flow_multiply(CycleFlow *flow) {
+    Orbit *orbit = &flow->orbit;
+    memcpy(flow->left, orbit->matrix, orbit->size * orbit->size * sizeof *flow->left);
     const Status status =
-        linear_system_eigenvalues(search->size, search->left, search->real, search->imaginary);
+        linear_system_eigenvalues(orbit->size, flow->left, orbit->real, orbit->imaginary);
     if (status == STATUS_INVALID)
-        search->real[0] = (double)NAN;
+        orbit->real[0] = (double)NAN;
     return status == STATUS_NO_MEMORY ? status : STATUS_OK;
 }
 
-double orbit_search_radius(const OrbitSearch *search) {
-    return hypot(search->real[0], search->imaginary[0]);
-}
-
-// The step of Newton's method: (I - P') step = P(y) - y, or the smallest one of least squares.
-static void orbit_search_solve(OrbitSearch *search) {
-    const size_t n = search->size;
-    double *A = search->left, *normal = A + n * n, *step = search->step, most = 0;
-    for (size_t i = 0; i < n; i++) {
-        step[i] = (search->end[i] - search->y[i]) / search->scales[i];
-        for (size_t k = 0; k < n; k++)
-            A[i * n + k] = (i == k) - search->matrix[i * n + k];
-    }
-    const bool is_solved = linear_system_solve(A, step, n, 1);
-    for (size_t i = 0; i < n; i++)
-        most = fabs(step[i]) <= most ? most : fabs(step[i]);
-    if (is_solved && most <= FARTHEST)
-        return;
-    double largest = 0;
-    for (size_t i = 0; i < n; i++)
-        for (size_t k = 0; k < n; k++)
-            A[i * n + k] = (i == k) - search->matrix[i * n + k];
+// The step of Newton's method: (I - P') step = P(y) - y, the smallest one of least squares.
+static void cycle_flow_solve(CycleFlow *flow) {
+    const Orbit *orbit = &flow->orbit;
+    const size_t n = orbit->size;
+    double *A = flow->left, *normal = A + n * n, *step = flow->step, largest = 0;
+    for (size_t i = 0; i < n * n; i++)
+        A[i] = (i % (n + 1) == 0) - orbit->matrix[i];
     for (size_t i = 0; i < n; i++) {
         step[i] = 0;
         for (size_t k = 0; k < n; k++) {
@@ -454,7 +439,7 @@ static void orbit_search_solve(OrbitSearch *search) {
             for (size_t l = 0; l < n; l++)
                 sum += A[l * n + i] * A[l * n + k];
             normal[i * n + k] = sum;
-            step[i] += A[k * n + i] * (search->end[k] - search->y[k]) / search->scales[k];
+            step[i] += A[k * n + i] * (orbit->end[k] - orbit->y[k]) / orbit->scales[k];
         }
         largest = fmax(largest, normal[i * n + i]);
     }
@@ -463,103 +448,115 @@ static void orbit_search_solve(OrbitSearch *search) {
     (void)linear_system_solve(normal, step, n, 1);
 }
 
-Status orbit_search_shoot(OrbitSearch *search, CycleFlow *flow, size_t period, bool *is_found,
-                          Problem *problem) {
+Status cycle_flow_shoot(CycleFlow *flow, size_t period) {
+    Orbit *orbit = &flow->orbit;
     Status status = STATUS_OK;
-    *is_found = false;
-    cycle_flow_scales(flow, search->scales);
+    orbit->period = 0;
+    cycle_flow_scale(flow);
     cycle_flow_keep(flow);
-    cycle_flow_get(flow, search->y);
-    for (int i = 0; i < NEWTON_STEPS && !*is_found; i++) {
-        const double change = orbit_search_map(search, flow, period, true, &status);
+    cycle_flow_get(flow, orbit->y);
+    for (int i = 0; i < NEWTON_STEPS && orbit->period == 0; i++) {
+        const double change = cycle_flow_map(flow, period, true, &status);
         if (!(change < FARTHEST))
             break;
-        orbit_search_solve(search);
+        cycle_flow_solve(flow);
         double step = 0;
-        for (size_t k = 0; k < search->size; k++) {
-            search->y[k] += search->step[k] * search->scales[k];
-            step = fmax(step, fabs(search->step[k]));
+        for (size_t k = 0; k < orbit->size; k++) {
+            orbit->y[k] += flow->step[k] * orbit->scales[k];
+            step = fmax(step, fabs(flow->step[k]));
         }
-        *is_found = change <= CLOSED || step <= CLOSE;
+        orbit->period = change <= CLOSED || step <= CLOSE ? period : 0;
     }
-    cycle_flow_restore(flow);
-    if (status != STATUS_OK && !orbit_search_is_lost(status, problem))
-        return status;
-    if (!*is_found)
+    cycle_flow_restore(flow, orbit->period > 0 ? orbit->y : NULL);
+    if (status == STATUS_UNSTABLE || status == STATUS_LIMIT) {
+        problem_clear(flow->problem); // ends only the search
         return STATUS_OK;
-    cycle_flow_set(flow, search->y);
-    return orbit_search_multiply(search);
+    }
+    return orbit->period > 0 ? cycle_flow_multiply(flow) : status;
 }
 
-// Whether the last `count` sections of the history return to an orbit that attracts.
-static Status orbit_search_try(OrbitSearch *search, CycleFlow *flow, size_t count, bool is_last,
-                               size_t *period, Problem *problem) {
-    const size_t rows = search->max_period + 1, n = search->size;
-    const double *now = search->history + count % rows * n;
-    cycle_flow_scales(flow, search->scales);
-    for (size_t p = 1; p <= search->max_period && p <= count; p++) {
-        bool is_found;
-        if (!(orbit_search_distance(search, now, search->history + (count - p) % rows * n) <=
+// Whether the last `count` sections of the history return to an orbit that attracts. Else *stay is
+// the number of cycles that the motion stays near an unstable one, 0: there is none.
+static Status cycle_flow_try(CycleFlow *flow, size_t count, size_t max_period, bool is_last,
+                             double *stay) {
+    Orbit *orbit = &flow->orbit;
+    const size_t rows = max_period + 1, n = orbit->size;
+    const double *now = flow->history + count % rows * n;
+    *stay = 0;
+    cycle_flow_scale(flow);
+    for (size_t p = 1; p <= max_period && p <= count; p++) {
+        if (!(cycle_flow_distance(orbit, now, flow->history + (count - p) % rows * n) <=
               RETURNED[is_last]))
             continue;
-        cycle_flow_get(flow, search->first);
-        TRY(orbit_search_shoot(search, flow, p, &is_found, problem));
-        if (is_found && orbit_search_radius(search) <= STABLE &&
-            orbit_search_distance(search, search->y, search->first) <= MOVED[is_last]) {
-            *period = p;
+        cycle_flow_get(flow, flow->first);
+        TRY(cycle_flow_shoot(flow, p));
+        if (orbit->period == 0)
+            continue;
+        const double radius = cycle_flow_radius(flow),
+                     distance = cycle_flow_distance(orbit, orbit->y, flow->first);
+        if (radius <= STABLE && distance <= MOVED[is_last])
             return STATUS_OK;
-        }
-        if (is_found)
-            cycle_flow_restore(flow);
+        if (distance <= MOVED[is_last])
+            *stay = fmax(*stay, (double)p * log(1 / fmax(distance, DBL_EPSILON)) / log(radius));
+        orbit->period = 0;
+        cycle_flow_restore(flow, NULL);
     }
     return STATUS_OK;
 }
 
-Status orbit_search_settle(OrbitSearch *search, CycleFlow *flow, size_t cycles, size_t *period,
-                           Problem *problem) {
+Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period) {
     const bool needs_flight = !cycle_flow_is_linearised(flow);
-    size_t next = FIRST_TRY;
-    *period = 0;
+    const size_t size = flow->orbit.size;
+    size_t next = FIRST_TRY, end = cycles;
+    flow->orbit.period = 0;
+    flow->orbit.is_settled = true;
     if (needs_flight)
         TRY(cycle_flow_shift(flow, false));
     for (size_t count = 0;; count++) {
-        const bool is_last = count >= cycles;
-        cycle_flow_get(flow, search->history + count % (search->max_period + 1) * search->size);
+        const bool is_last = count >= end;
+        cycle_flow_get(flow, flow->history + count % (max_period + 1) * size);
         if (is_last && needs_flight)
             TRY(cycle_flow_shift(flow, false));
         if ((count >= next || is_last) && (!needs_flight || cycle_flow_is_flying(flow))) {
-            TRY(orbit_search_try(search, flow, count, is_last, period, problem));
+            double stay;
+            TRY(cycle_flow_try(flow, count, max_period, is_last, &stay));
             next *= 2;
+            if (is_last && end == cycles && stay > 0) {
+                const double patience = PATIENCE * (double)cycles;
+                flow->orbit.is_settled = stay <= patience;
+                end += (size_t)ceil(fmin(stay, patience));
+            }
         }
-        if (is_last || *period > 0)
+        if (count >= end || flow->orbit.period > 0)
             return STATUS_OK;
         TRY(cycle_flow_run(flow, 1, NULL, 0, NULL));
     }
 }
 
 // The change of one column, which returns to its first size (Benettin 1980).
-static double orbit_search_growth(const OrbitSearch *search, double *column) {
+static double cycle_flow_growth(const Orbit *orbit, double *column) {
     double size = 0;
-    for (size_t i = 0; i < search->size; i++)
-        size += column[i] / search->scales[i] * (column[i] / search->scales[i]);
+    for (size_t i = 0; i < orbit->size; i++)
+        size += column[i] / orbit->scales[i] * (column[i] / orbit->scales[i]);
     size = sqrt(size);
-    for (size_t i = 0; i < search->size; i++)
+    for (size_t i = 0; i < orbit->size; i++)
         column[i] /= size;
     return log(size);
 }
 
-Status orbit_search_wander(OrbitSearch *search, CycleFlow *flow, size_t cycles, double *exponent,
-                           size_t points, double (*section)[2], CycleMotion *motion) {
+Status cycle_flow_wander(CycleFlow *flow, size_t cycles, double *exponent, size_t points,
+                         double (*section)[2], CycleMotion *motion) {
     const bool is_linearised = cycle_flow_is_linearised(flow);
-    double *column = search->step, sum = 0, squares = 0;
-    cycle_flow_scales(flow, search->scales);
-    memcpy(column, search->scales, search->size * sizeof *column);
-    (void)orbit_search_growth(search, column);
+    const Orbit *orbit = &flow->orbit;
+    double *column = flow->step, sum = 0, squares = 0;
+    cycle_flow_scale(flow);
+    memcpy(column, orbit->scales, orbit->size * sizeof *column);
+    (void)cycle_flow_growth(orbit, column);
     *motion = (CycleMotion){0};
     for (size_t i = 0; i < cycles + WARM_UP; i++) {
         CycleMotion cycle;
         TRY(cycle_flow_run(flow, 1, is_linearised ? column : NULL, 1, &cycle));
-        const double growth = is_linearised ? orbit_search_growth(search, column) : (double)NAN;
+        const double growth = is_linearised ? cycle_flow_growth(orbit, column) : (double)NAN;
         if (i < WARM_UP)
             continue;
         sum += growth;

@@ -6,6 +6,8 @@
 
 #include "core/solve/exact.h"
 
+enum { CYCLE_FLOW_PERIOD = 64 }; // longest of an orbit that is searched for [cycles]
+
 typedef struct CycleFlow CycleFlow;
 
 // What a flow runs, and how.
@@ -20,22 +22,33 @@ typedef struct CycleFlowInputs {
 
 // Starts from the plan's initial state or, if `from` is not NULL, from the present state of a flow
 // of as many storeys and dampers. Freed by cycle_flow_free; NULL after a failure. The flow borrows
-// `problem`.
+// `problem`, also for the functions below.
 Status cycle_flow_new(const CycleFlowInputs *inputs, const CycleFlow *from, CycleFlow **flow,
                       Problem *problem);
 void cycle_flow_free(CycleFlow *flow); // NULL is fine
 
-// The state y = (q, p, u, w): modes, then displacements of the dampers from the middle of their
-// stops and their speeds, both relative to their storeys.
-size_t cycle_flow_size(const CycleFlow *flow);
-void cycle_flow_get(const CycleFlow *flow, double *y);
-void cycle_flow_set(CycleFlow *flow, const double *y); // the contact states remain
-// Magnitudes of the components of the present state and of its motion, above 0.
-void cycle_flow_scales(const CycleFlow *flow, double *scales);
+// An orbit of the flow, or a state from which one is searched for. The state y = (q, p, u, w) has
+// the modes, then displacements of the dampers from the middle of their stops and their speeds,
+// both relative to their storeys.
+typedef struct Orbit {
+    size_t size, period;      // of y; cycles, or 0: none was found
+    double *scales;           // magnitudes of y and of its motion, above 0
+    double *y, *end;          // at the section, and a period later
+    double *matrix;           // of the return map at y, scaled
+    double *real, *imaginary; // its eigenvalues: the Floquet multipliers, the largest first
+    bool is_settled;          // nothing known suggests that the motion is still a transient
+} Orbit;
 
-// Keeps the present state with its contacts, and returns to it.
+// Borrowed. A flow from another one of the same size begins with its scales.
+Orbit *cycle_flow_orbit(CycleFlow *flow);
+// The magnitude of the largest multiplier; NAN: it was not found.
+double cycle_flow_radius(const CycleFlow *flow);
+
+void cycle_flow_get(const CycleFlow *flow, double *y);
+// Keeps the present state with its contacts, and returns to it; `y` replaces it but for contacts
+// (NULL: nothing).
 void cycle_flow_keep(CycleFlow *flow);
-void cycle_flow_restore(CycleFlow *flow);
+void cycle_flow_restore(CycleFlow *flow, const double *y);
 
 typedef struct CycleMotion {
     double peak_displacement, rms_displacement; // the largest of all storeys, events included [m]
@@ -65,57 +78,29 @@ void cycle_flow_top(const CycleFlow *flow, double *displacement, double *velocit
 double cycle_flow_undamped_peak(const CycleFlow *flow);
 
 double cycle_flow_period(const CycleFlow *flow); // of the sine [s]
+double cycle_flow_steps(const CycleFlow *flow);  // solver steps so far
 
-// --- periodic orbits ---
-
-// Scratch memory for motions of one size, and what the last search found. Numbers of the state are
-// scaled by cycle_flow_scales.
-typedef struct OrbitSearch {
-    size_t size, max_period;
-    double *scales, *y, *end; // y: the orbit's state at the section
-    double *matrix;           // of the return map at y
-    double *real, *imaginary; // its eigenvalues: the Floquet multipliers, the largest first
-    double *step, *columns, *left, *history, *first;
-    double *block;
-} OrbitSearch;
-
-// STATUS_NO_MEMORY. Freed by orbit_search_clear.
-Status orbit_search_make(OrbitSearch *search, size_t size, size_t max_period);
-void orbit_search_clear(OrbitSearch *search);
-
-// The scaled return map over `period` cycles from search->y, with the contact states that the flow
+// The scaled return map over `period` cycles from orbit->y, with the contact states that the flow
 // keeps: the end, and its matrix where `has_matrix`. Returns the largest change by the map; NAN: it
 // failed. `status` is that of the run.
-double orbit_search_map(OrbitSearch *search, CycleFlow *flow, size_t period, bool has_matrix,
-                        Status *status);
+double cycle_flow_map(CycleFlow *flow, size_t period, bool has_matrix, Status *status);
 
-// The multipliers of `matrix`. STATUS_OK or STATUS_NO_MEMORY; NAN where they were not found.
-Status orbit_search_multiply(OrbitSearch *search);
-// The magnitude of the largest one.
-double orbit_search_radius(const OrbitSearch *search);
+// The multipliers of the matrix. STATUS_OK or STATUS_NO_MEMORY.
+Status cycle_flow_multiply(CycleFlow *flow);
 
 // Newton's method from the present state. The flow moves onto the orbit, of which the multipliers
 // are found too, or returns if there is none.
-Status orbit_search_shoot(OrbitSearch *search, CycleFlow *flow, size_t period, bool *is_found,
-                          Problem *problem);
+Status cycle_flow_shoot(CycleFlow *flow, size_t period);
 
-// Moves the flow over at most `cycles` until a periodic motion attracts it, and onto that. `period`
-// is its number of cycles, or 0: none of at most max_period cycles was found.
-Status orbit_search_settle(OrbitSearch *search, CycleFlow *flow, size_t cycles, size_t *period,
-                           Problem *problem);
+// Moves over at most `cycles` until a periodic motion of at most max_period cycles attracts the
+// flow, and onto that. Near an unstable orbit it goes on for as long as leaving that takes, up to
+// nine times as many more.
+Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period);
 
 // Moves over `cycles` and returns the largest Lyapunov exponent per cycle; NAN: unknown. The
 // displacement and velocity of the top storey after each of the first `points` cycles are written
 // to `section`.
-Status orbit_search_wander(OrbitSearch *search, CycleFlow *flow, size_t cycles, double *exponent,
-                           size_t points, double (*section)[2], CycleMotion *motion);
-
-// Whether a failure ends only the search, of which the problem is then cleared.
-static inline bool orbit_search_is_lost(Status status, Problem *problem) {
-    const bool is_lost = status == STATUS_UNSTABLE || status == STATUS_LIMIT;
-    if (is_lost)
-        problem_clear(problem);
-    return is_lost;
-}
+Status cycle_flow_wander(CycleFlow *flow, size_t cycles, double *exponent, size_t points,
+                         double (*section)[2], CycleMotion *motion);
 
 #endif

@@ -10,6 +10,7 @@
 #include "core/study/response_curve.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -41,7 +42,7 @@ static const Field response_study_fields[] = {
     FIELD_ITEM(ResponseStudy, axis, study_axis_fields, NULL, PRESENCE_REQUIRED, "the number that varies: a range of from, to and count; the exact solver is used whatever the scene's solver is"),
     FIELD_CHOICE(ResponseStudy, direction, curve_direction_names, CURVE_UP, "up: from, then on to to, each point from the state of the one before; down: the reverse; both: up, then down"),
     FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic; fewer where a stable orbit is found earlier"),
-    FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CURVE_PERIOD), 8, "longest period searched for, in cycles of the sine"),
+    FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CYCLE_FLOW_PERIOD), 8, "longest period searched for, in cycles of the sine"),
     FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits: at most four points for each value of the axis, and 200"),
     FIELD_COUNT(ResponseStudy, section_points, NULL, WITHIN(0, CURVE_SECTION), 64, "points of the section where no periodic orbit is found"),
     FIELD_BASE(ResponseStudy, names, study_names_fields),
@@ -65,22 +66,14 @@ const Field response_point_fields[] = {
     FIELD_END
 };
 
-static const Field response_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "points that failed for this reason"),
-    {.name = "first_point", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "index of the first of them"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
-    FIELD_END
-};
+static const Field response_failure_fields[] = {STUDY_FAILURE_ROWS("first_point", "index of the first of them")};
+static const Field response_runs_fields[] = {STUDY_RUNS_ROWS(response_failure_fields)};
 
 static const Field response_answer_fields[] = {
     FIELD_TEXT(ResponseCurve, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member that varies, the first of tied ones"),
     FIELD_TEXT(ResponseCurve, unit, 0, PRESENCE_OPTIONAL, 0, "of its values"),
-    FIELD_COUNT(ResponseCurve, runs, NULL, AT_MIN(0), 0, "points made"),
-    FIELD_COUNT(ResponseCurve, failed, NULL, AT_MIN(0), 0, "of these without a result"),
-    FIELD_LIST(ResponseCurve, failures, response_failure_fields, 0, PRESENCE_DEFAULT, "points that failed, by their reason"),
+    FIELD_BASE(ResponseCurve, made, response_runs_fields),
     FIELD_LIST(ResponseCurve, points, response_point_fields, 0, PRESENCE_DEFAULT, "in the order in which they were made, and along each curve of a continuation"),
-    FIELD_LIST(ResponseCurve, warnings, warning_fields, 0, PRESENCE_DEFAULT, "limits that were met"),
     FIELD_END
 };
 // clang-format on
@@ -100,13 +93,15 @@ typedef struct CurveWork {
     Problem *problem;
     ProgressRange range;
     Progress progress; // of the runs: at the fraction of the points made
-    OrbitSearch search;
-    CycleFlow *flow; // at the last point
-    uint64_t branch; // so far
+    CycleFlow *flow;   // at the last point
+    uint64_t branch;   // so far
     CurveStart starts[CURVE_BRANCHES];
     size_t start_count;
     // Of a continuation; vectors have a number for the value behind the scaled state.
+    size_t size; // of the state
     double *block, *z, *at, *tangent, *by_value, *matrix;
+    size_t unsettled_count;
+    char unsettled[64]; // numbers of the first of these points
 } CurveWork;
 
 static double curve_frequency(const Simulation *simulation) {
@@ -252,13 +247,6 @@ static Status curve_make_flow(CurveWork *work, double value, const CycleFlow *fr
     return status;
 }
 
-static Status curve_make_search(CurveWork *work, size_t size) {
-    if (work->search.size == size)
-        return STATUS_OK;
-    orbit_search_clear(&work->search);
-    return orbit_search_make(&work->search, size, (size_t)work->study->max_period);
-}
-
 static Status curve_add_row(double a, double b, Rows *rows) {
     Reals *row = list_append(rows, sizeof *row);
     TRY(status_made(row != NULL));
@@ -272,22 +260,20 @@ static ResponsePoint *curve_add_point(CurveWork *work, double value, int directi
     (void)fields_default(response_point_fields, point);
     point->value = value;
     point->direction = direction;
-    work->answer->runs++;
     return point;
 }
 
-// Of the orbit in the search, at which the flow is.
-static Status curve_fill_orbit(CurveWork *work, CycleFlow *flow, size_t period,
-                               ResponsePoint *point) {
-    const OrbitSearch *search = &work->search;
+// Of the orbit at which the flow is.
+static Status curve_fill_orbit(CycleFlow *flow, size_t period, ResponsePoint *point) {
+    const Orbit *orbit = cycle_flow_orbit(flow);
     CycleMotion motion;
     TRY(cycle_flow_run(flow, period, NULL, 0, &motion));
-    const double radius = orbit_search_radius(search);
+    const double radius = cycle_flow_radius(flow);
     point->period = period;
     point->impacts_per_period = motion.impacts;
     point->stable = isnan(radius) ? CHOICE_ABSENT : radius < 1 - CURVE_MARGIN;
-    for (size_t i = 0; i < search->size && !isnan(radius); i++)
-        TRY(curve_add_row(search->real[i], search->imaginary[i], &point->multipliers));
+    for (size_t i = 0; i < orbit->size && !isnan(radius); i++)
+        TRY(curve_add_row(orbit->real[i], orbit->imaginary[i], &point->multipliers));
     point->peak_displacement = motion.peak_displacement;
     point->rms_displacement = motion.rms_displacement;
     point->undamped_peak_displacement = cycle_flow_undamped_peak(flow);
@@ -300,8 +286,8 @@ static Status curve_fill_section(CurveWork *work, CycleFlow *flow, double period
     double(*section)[2] = calloc(points + 1, sizeof *section), exponent;
     TRY(status_made(section != NULL));
     CycleMotion motion;
-    Status status = orbit_search_wander(&work->search, flow, curve_wander_cycles(work->study),
-                                        &exponent, points, section, &motion);
+    Status status = cycle_flow_wander(flow, curve_wander_cycles(work->study), &exponent, points,
+                                      section, &motion);
     point->peak_displacement = motion.peak_displacement;
     point->rms_displacement = motion.rms_displacement;
     point->undamped_peak_displacement = cycle_flow_undamped_peak(flow);
@@ -334,22 +320,29 @@ static Status curve_find_branch(CurveWork *work, CycleFlow *flow, size_t number,
     return STATUS_OK;
 }
 
+static void curve_note_unsettled(CurveWork *work, size_t number) {
+    char text[32];
+    snprintf(text, sizeof text, "%zu", number);
+    text_list(work->unsettled, sizeof work->unsettled, text);
+    work->unsettled_count++;
+}
+
 static Status curve_make_point(CurveWork *work, CycleFlow *flow, size_t number) {
-    OrbitSearch *search = &work->search;
-    size_t period;
+    const ResponseStudy *study = work->study;
+    const Orbit *orbit = cycle_flow_orbit(flow);
     double before[CURVE_STATE], jump = 0;
-    TRY(curve_make_search(work, cycle_flow_size(flow)));
     cycle_flow_get(flow, before);
-    TRY(orbit_search_settle(search, flow, (size_t)work->study->settle_cycles, &period,
-                            work->problem));
+    TRY(cycle_flow_settle(flow, (size_t)study->settle_cycles, (size_t)study->max_period));
     ResponsePoint *point = &work->answer->points.at[number];
-    if (period > 0) {
-        for (size_t i = 0; i < search->size && cycle_flow_is_linearised(flow); i++)
-            jump = fmax(jump, fabs(search->y[i] - before[i]) / search->scales[i]);
-        TRY(curve_fill_orbit(work, flow, period, point));
+    if (orbit->period > 0) {
+        for (size_t i = 0; i < orbit->size && cycle_flow_is_linearised(flow); i++)
+            jump = fmax(jump, fabs(orbit->y[i] - before[i]) / orbit->scales[i]);
+        TRY(curve_fill_orbit(flow, orbit->period, point));
         TRY(curve_find_branch(work, flow, number, jump));
         return cycle_flow_shift(flow, true);
     }
+    if (!orbit->is_settled)
+        curve_note_unsettled(work, number);
     TRY(cycle_flow_shift(flow, true));
     TRY(curve_fill_section(work, flow, cycle_flow_period(flow), point));
     return curve_find_branch(work, flow, number, 0);
@@ -357,22 +350,18 @@ static Status curve_make_point(CurveWork *work, CycleFlow *flow, size_t number) 
 
 // A failure of a point is counted and leaves its row without numbers.
 static Status curve_fail(CurveWork *work, Status status, size_t number) {
-    if (study_run_ends_study(status) || status == STATUS_OK)
+    if (study_run_ends_study(status))
         return status;
     ResponsePoint *point = &work->answer->points.at[number];
-    ResponsePoint empty;
-    (void)fields_default(response_point_fields, &empty);
-    empty.value = point->value;
-    empty.direction = point->direction;
-    empty.branch = ++work->branch;
+    const double value = point->value;
+    const int direction = point->direction;
     fields_clear(response_point_fields, point);
-    *point = empty;
-    work->answer->failed++;
-    status =
-        study_failures_add(&work->answer->failures, (int)status,
-                           sweep_status_names[sweep_status(status)], number, work->problem->detail);
+    (void)fields_default(response_point_fields, point);
+    point->value = value;
+    point->direction = direction;
+    point->branch = ++work->branch;
     problem_clear(work->problem);
-    return status;
+    return STATUS_OK;
 }
 
 static Status curve_advance(CurveWork *work) {
@@ -394,6 +383,11 @@ static Status curve_sweep(CurveWork *work, int direction) {
         Status status = curve_make_flow(work, value, work->flow, &flow);
         if (status == STATUS_OK)
             status = curve_make_point(work, flow, number);
+        TRY(study_runs_add(&work->answer->made,
+                           &(RunRecord){.status = status,
+                                        .steps = flow != NULL ? cycle_flow_steps(flow) : 0,
+                                        .why = work->problem->detail},
+                           number));
         if (status == STATUS_OK) {
             cycle_flow_free(work->flow);
             work->flow = flow;
@@ -415,28 +409,27 @@ static double curve_span(const CurveWork *work) {
 // *made is the flow there, with the contact states of `from`.
 static Status curve_evaluate(CurveWork *work, const CycleFlow *from, size_t period, double *change,
                              CycleFlow **made) {
-    OrbitSearch *search = &work->search;
-    const size_t n = search->size;
-    double end[CURVE_STATE];
+    const size_t n = work->size;
     CycleFlow *beside = NULL;
     *change = (double)NAN;
     Status status = curve_make_flow(work, work->z[n] * curve_span(work), from, made);
     if (status == STATUS_OK)
         status = curve_make_flow(work, (work->z[n] + CURVE_DIFFERENCE) * curve_span(work), from,
                                  &beside);
-    if (status == STATUS_OK && cycle_flow_size(*made) == n && cycle_flow_size(beside) == n) {
+    if (status == STATUS_OK && cycle_flow_orbit(*made)->size == n &&
+        cycle_flow_orbit(beside)->size == n) {
+        const Orbit *orbit = cycle_flow_orbit(*made), *other = cycle_flow_orbit(beside);
         for (size_t i = 0; i < n; i++)
-            search->y[i] = work->z[i] * search->scales[i];
+            orbit->y[i] = other->y[i] = work->z[i] * orbit->scales[i];
         cycle_flow_keep(beside);
-        (void)orbit_search_map(search, beside, period, false, &status);
-        memcpy(end, search->end, n * sizeof *end);
         cycle_flow_keep(*made);
+        (void)cycle_flow_map(beside, period, false, &status);
         if (status == STATUS_OK)
-            *change = orbit_search_map(search, *made, period, true, &status);
+            *change = cycle_flow_map(*made, period, true, &status);
         for (size_t i = 0; i < n; i++)
-            work->by_value[i] = (end[i] - search->end[i]) / search->scales[i] / CURVE_DIFFERENCE;
-        cycle_flow_restore(*made);
-        cycle_flow_set(*made, search->y);
+            work->by_value[i] =
+                (other->end[i] - orbit->end[i]) / orbit->scales[i] / CURVE_DIFFERENCE;
+        cycle_flow_restore(*made, orbit->y);
     }
     cycle_flow_free(beside);
     if (study_run_ends_study(status))
@@ -445,120 +438,112 @@ static Status curve_evaluate(CurveWork *work, const CycleFlow *from, size_t peri
     return STATUS_OK;
 }
 
-// Solves (I - P') x - P_value x_value = right, tangent . x = last for `right`, whose last is given.
-static bool curve_solve(CurveWork *work, double *right) {
-    const size_t n = work->search.size, m = n + 1;
+// Newton's step from work->z, at which `orbit` was evaluated, across the tangent:
+// (I - P') x - P_value x_value = P(y) - y, tangent . x = 0. Returns its largest value; NAN: none.
+static double curve_step(CurveWork *work, const Orbit *orbit) {
+    const size_t n = work->size, m = n + 1;
+    double step[CURVE_STATE + 1] = {0}, most = 0;
     for (size_t i = 0; i < n; i++) {
         for (size_t k = 0; k < n; k++)
-            work->matrix[i * m + k] = (i == k) - work->search.matrix[i * n + k];
+            work->matrix[i * m + k] = (i == k) - orbit->matrix[i * n + k];
         work->matrix[i * m + n] = -work->by_value[i];
+        step[i] = (orbit->end[i] - orbit->y[i]) / orbit->scales[i];
     }
-    memcpy(work->matrix + n * m, work->tangent, m * sizeof *right);
-    return linear_system_solve(work->matrix, right, m, 1);
-}
-
-// Turns the tangent to that of the curve at the last evaluation, in the direction so far.
-static bool curve_turn(CurveWork *work) {
-    const size_t n = work->search.size;
-    double next[CURVE_STATE + 1] = {0}, size = 0;
-    next[n] = 1;
-    if (!curve_solve(work, next))
-        return false;
-    for (size_t i = 0; i <= n; i++)
-        size += next[i] * next[i];
-    for (size_t i = 0; i <= n; i++)
-        work->tangent[i] = next[i] / sqrt(size);
-    return isfinite(size);
+    memcpy(work->matrix + n * m, work->tangent, m * sizeof *step);
+    if (!linear_system_solve(work->matrix, step, m, 1))
+        return (double)NAN;
+    for (size_t i = 0; i < m; i++) {
+        work->z[i] += step[i];
+        most = fmax(most, fabs(step[i]));
+    }
+    return most;
 }
 
 // Newton's method from work->at + step tangent. *count is that of the corrections; *made is NULL if
 // they failed.
 static Status curve_correct(CurveWork *work, const CycleFlow *from, size_t period, double step,
                             int *count, CycleFlow **made) {
-    const OrbitSearch *search = &work->search;
-    const size_t n = search->size;
-    for (size_t i = 0; i <= n; i++)
+    for (size_t i = 0; i <= work->size; i++)
         work->z[i] = work->at[i] + step * work->tangent[i];
-    for (*count = 0; *count < CURVE_CORRECTIONS; ++*count) {
-        double change, right[CURVE_STATE + 1], most = 0;
+    double moved = 0;
+    *made = NULL;
+    for (*count = 0; *count < CURVE_CORRECTIONS && moved < 1; ++*count) {
+        double change;
         TRY(curve_evaluate(work, from, period, &change, made));
         if (change <= CURVE_PRECISION)
             return STATUS_OK;
+        moved = change < 1 ? curve_step(work, cycle_flow_orbit(*made)) : (double)NAN;
         cycle_flow_free(*made);
         *made = NULL;
-        if (!(change < 1))
-            return STATUS_OK;
-        for (size_t i = 0; i < n; i++)
-            right[i] = (search->end[i] - search->y[i]) / search->scales[i];
-        right[n] = 0;
-        if (!curve_solve(work, right))
-            return STATUS_OK;
-        for (size_t i = 0; i <= n; i++) {
-            work->z[i] += right[i];
-            most = fmax(most, fabs(right[i]));
-        }
-        if (!(most < 1))
-            return STATUS_OK;
     }
+    return STATUS_OK;
+}
+
+// The next point becomes the last one, and the tangent the secant through both.
+static void curve_turn(CurveWork *work) {
+    double size = 0;
+    for (size_t i = 0; i <= work->size; i++) {
+        work->tangent[i] = work->z[i] - work->at[i];
+        size += work->tangent[i] * work->tangent[i];
+    }
+    for (size_t i = 0; i <= work->size; i++) {
+        work->tangent[i] /= sqrt(size);
+        work->at[i] = work->z[i];
+    }
+}
+
+// A point of a continuation, at which the flow is.
+static Status curve_fill_continued(CurveWork *work, CycleFlow *flow, double value, size_t period) {
+    ResponsePoint *point = curve_add_point(work, value, CHOICE_ABSENT);
+    TRY(status_made(point != NULL));
+    point->branch = work->branch;
+    TRY(cycle_flow_multiply(flow));
+    TRY(curve_fill_orbit(flow, period, point));
+    cycle_flow_restore(flow, cycle_flow_orbit(flow)->y);
     return STATUS_OK;
 }
 
 // Follows the branch of an orbit to one side until it leaves the axis or is lost.
 static Status curve_follow(CurveWork *work, const CurveStart *start, size_t period, double side) {
-    OrbitSearch *search = &work->search;
-    const size_t n = search->size;
-    const double from = work->study->axis.from / curve_span(work),
-                 to = work->study->axis.to / curve_span(work);
-    const size_t first = work->answer->points.count;
+    const size_t n = work->size, first = work->answer->points.count;
+    const double span = curve_span(work);
     CycleFlow *flow = NULL;
-    double step = CURVE_STEP, change;
-    cycle_flow_get(start->flow, work->z);
+    Status status = STATUS_OK;
+    double step = CURVE_STEP;
+    cycle_flow_get(start->flow, work->at);
     for (size_t i = 0; i < n; i++) {
-        work->z[i] /= search->scales[i];
+        work->at[i] /= cycle_flow_orbit(start->flow)->scales[i];
         work->tangent[i] = 0;
     }
-    work->z[n] = start->value / curve_span(work);
+    work->at[n] = start->value / span;
     work->tangent[n] = side;
-    TRY(curve_evaluate(work, start->flow, period, &change, &flow));
-    Status status = STATUS_OK;
-    bool goes_on = change <= 100 * CURVE_PRECISION && curve_turn(work);
-    memcpy(work->at, work->z, (n + 1) * sizeof *work->at);
-    while (goes_on && status == STATUS_OK && step >= CURVE_STEP_MIN &&
+    while (status == STATUS_OK && step >= CURVE_STEP_MIN &&
            work->answer->points.count - first < curve_continued(work->study) / 8 &&
            work->answer->points.count + 1 < curve_points_max(work->study)) {
-        int count;
+        int count = 0;
         CycleFlow *next = NULL;
         status = curve_advance(work);
         if (status == STATUS_OK)
-            status = curve_correct(work, flow, period, step, &count, &next);
+            status =
+                curve_correct(work, flow != NULL ? flow : start->flow, period, step, &count, &next);
         if (next == NULL) {
             step /= 2;
             continue;
         }
         cycle_flow_free(flow);
         flow = next;
-        const double value = work->z[n];
-        goes_on = value >= from && value <= to;
-        memcpy(work->at, work->z, (n + 1) * sizeof *work->at);
+        const double value = work->z[n] * span;
+        if (!(value >= work->study->axis.from && value <= work->study->axis.to))
+            break;
+        curve_turn(work);
         step = count < CURVE_EASY   ? fmin(1.5 * step, CURVE_STEP_MAX)
                : count > CURVE_HARD ? step / 2
                                     : step;
-        if (!goes_on || status != STATUS_OK)
-            break;
-        ResponsePoint *point = curve_add_point(work, value * curve_span(work), CHOICE_ABSENT);
-        status = status_made(point != NULL);
         if (status == STATUS_OK)
-            status = orbit_search_multiply(search);
-        goes_on = curve_turn(work);
-        if (status == STATUS_OK)
-            point->branch = work->branch;
-        if (status == STATUS_OK)
-            status = curve_fill_orbit(work, flow, period, point);
-        cycle_flow_restore(flow);
-        cycle_flow_set(flow, search->y);
+            status = curve_fill_continued(work, flow, value, period);
     }
     cycle_flow_free(flow);
-    if (status == STATUS_OK || study_run_ends_study(status))
+    if (study_run_ends_study(status))
         return status;
     problem_clear(work->problem);
     return STATUS_OK;
@@ -595,8 +580,7 @@ static Status curve_continue(CurveWork *work, const CurveStart *start) {
     const size_t first = points->count, period = (size_t)begin.period;
     if (curve_is_followed(work, &begin) || first >= curve_points_max(work->study))
         return STATUS_OK;
-    TRY(curve_make_search(work, cycle_flow_size(start->flow)));
-    cycle_flow_scales(start->flow, work->search.scales);
+    work->size = cycle_flow_orbit(start->flow)->size;
     work->branch++;
     TRY(curve_follow(work, start, period, -1));
     curve_reverse(points, first);
@@ -624,10 +608,20 @@ static Status curve_continue_all(CurveWork *work) {
                 TRY(curve_continue(work, &work->starts[i]));
     return work->answer->points.count + 1 < curve_points_max(work->study)
                ? STATUS_OK
-               : warnings_add(&work->answer->warnings, "/study/continuation",
+               : warnings_add(&work->answer->made.warnings, "/study/continuation",
                               "the continuation ended at its limit of %zu points: give a larger "
                               "count or a shorter range",
                               curve_continued(work->study));
+}
+
+static Status curve_warn(CurveWork *work) {
+    StudyRuns *made = &work->answer->made;
+    if (work->unsettled_count > 0)
+        TRY(warnings_add(&made->warnings, "/study/settle_cycles",
+                         "%zu points without a period may still be transients: %s; more "
+                         "settle_cycles decide it",
+                         work->unsettled_count, work->unsettled));
+    return study_runs_warn(made);
 }
 
 static Status curve_begin(void *of, const StudyTools *tools, Problem *problem) {
@@ -650,7 +644,7 @@ static Status curve_begin(void *of, const StudyTools *tools, Problem *problem) {
         TRY(curve_continue_all(work));
     for (size_t i = 0; i < work->answer->points.count; i++)
         work->answer->points.at[i].index = i;
-    return STATUS_OK;
+    return curve_warn(work);
 }
 
 static void curve_free(void *of) {
@@ -658,7 +652,6 @@ static void curve_free(void *of) {
     for (size_t i = 0; i < work->start_count; i++)
         cycle_flow_free(work->starts[i].flow);
     cycle_flow_free(work->flow);
-    orbit_search_clear(&work->search);
     free(work->block);
 }
 

@@ -9,7 +9,6 @@
 enum {
     CURVE_VALUES = 10000,
     CURVE_CYCLES = 100000,
-    CURVE_PERIOD = 64,    // cycles
     CURVE_SECTION = 4096, // points
     CURVE_STATE = 60,     // numbers in the state
     CURVE_ROWS = 1 << 20, // pairs of numbers in the answer
@@ -34,7 +33,7 @@ typedef struct ResponsePoint {
     int direction;   // CurveDirection; CHOICE_ABSENT: of a continuation
     uint64_t period; // cycles; COUNT_ABSENT: no periodic orbit found
     uint64_t impacts_per_period;
-    int stable; // 0, 1 or CHOICE_ABSENT
+    int stable;       // 0, 1 or CHOICE_ABSENT
     Rows multipliers; // real and imaginary part of each
     double peak_displacement, rms_displacement, undamped_peak_displacement; // [m]
     Rows section;    // displacement and velocity
@@ -51,10 +50,8 @@ typedef struct ResponsePoints {
 typedef struct ResponseCurve {
     Variant variant;
     char *pointer, *unit; // of the axis, of its first member; unit NULL: none
-    uint64_t runs, failed;
-    StudyFailures failures;
+    StudyRuns made;       // points
     ResponsePoints points;
-    Warnings warnings;
 } ResponseCurve;
 
 #endif

@@ -159,6 +159,7 @@ void chart_response(const Variant *answer, Bytes *bytes) {
     response_add_sections(&chart, curve, axis);
     chart_note(&chart, " ",
                chart_text(&chart, "%llu points, of which %llu failed",
-                          (unsigned long long)curve->runs, (unsigned long long)curve->failed));
+                          (unsigned long long)curve->made.runs,
+                          (unsigned long long)curve->made.failed));
     chart_write(&chart, bytes);
 }

@@ -71,69 +71,65 @@ static CycleFlow *draw_flow(void) {
     return flow;
 }
 
-static double distance_of(const OrbitSearch *search, const double *y) {
+static double distance_of(const Orbit *orbit, const double *y) {
     double most = 0;
-    for (size_t i = 0; i < search->size; i++)
-        most = fmax(most, fabs(y[i] - search->y[i]) / search->scales[i]);
+    for (size_t i = 0; i < orbit->size; i++)
+        most = fmax(most, fabs(y[i] - orbit->y[i]) / orbit->scales[i]);
     return most;
 }
 
 // Central differences of the map over the orbit, on which the flow is. It keeps its contacts.
-static void slopes_make(const OrbitSearch *search, CycleFlow *flow, size_t period, double step,
+static void slopes_make(const Orbit *orbit, CycleFlow *flow, size_t period, double step,
                         double *slopes) {
     double ends[2][STATE], moved[STATE];
-    for (size_t i = 0; i < search->size; i++) {
+    for (size_t i = 0; i < orbit->size; i++) {
         for (int side = 0; side < 2; side++) {
-            memcpy(moved, search->y, search->size * sizeof *moved);
-            moved[i] += (side == 0 ? step : -step) * search->scales[i];
-            cycle_flow_restore(flow);
-            cycle_flow_set(flow, moved);
+            memcpy(moved, orbit->y, orbit->size * sizeof *moved);
+            moved[i] += (side == 0 ? step : -step) * orbit->scales[i];
+            cycle_flow_restore(flow, moved);
             assert_int_equal(cycle_flow_run(flow, period, NULL, 0, NULL), STATUS_OK);
             cycle_flow_get(flow, ends[side]);
         }
-        for (size_t k = 0; k < search->size; k++)
-            slopes[k * search->size + i] =
-                (ends[0][k] - ends[1][k]) / (2 * step * search->scales[k]);
+        for (size_t k = 0; k < orbit->size; k++)
+            slopes[k * orbit->size + i] = (ends[0][k] - ends[1][k]) / (2 * step * orbit->scales[k]);
     }
 }
 
-static double matrix_difference(const OrbitSearch *search, const double *a, const double *b) {
+static double matrix_difference(const Orbit *orbit, const double *a, const double *b) {
     double worst = 0, most = 1;
-    for (size_t i = 0; i < search->size * search->size; i++) {
+    for (size_t i = 0; i < orbit->size * orbit->size; i++) {
         worst = fmax(worst, fabs(a[i] - b[i]));
-        most = fmax(most, fabs(search->matrix[i]));
+        most = fmax(most, fabs(orbit->matrix[i]));
     }
     return worst / most;
 }
 
 // The difference of the matrix to central differences, relative to its largest value; NAN where
 // these themselves do not settle, as where an orbit only just touches a stop.
-static double difference_of(const OrbitSearch *search, CycleFlow *flow, size_t period) {
+static double difference_of(const Orbit *orbit, CycleFlow *flow, size_t period) {
     double slopes[2][STATE * STATE], least = (double)NAN;
-    slopes_make(search, flow, period, 1e-6, slopes[0]);
+    slopes_make(orbit, flow, period, 1e-6, slopes[0]);
     for (int i = 1; i < 4; i++) {
-        slopes_make(search, flow, period, 1e-6 * pow(10, -i), slopes[i % 2]);
-        if (matrix_difference(search, slopes[0], slopes[1]) < 5e-6)
-            least = fmin(least, matrix_difference(search, slopes[i % 2], search->matrix));
+        slopes_make(orbit, flow, period, 1e-6 * pow(10, -i), slopes[i % 2]);
+        if (matrix_difference(orbit, slopes[0], slopes[1]) < 5e-6)
+            least = fmin(least, matrix_difference(orbit, slopes[i % 2], orbit->matrix));
     }
     return least;
 }
 
 // Starts beside the orbit. Whether the distance falls to a tenth of the first and stays there
 // (stable), or grows to ten times of it.
-static bool orbit_behaves(const OrbitSearch *search, CycleFlow *flow, size_t period,
-                          bool is_stable) {
+static bool orbit_behaves(const Orbit *orbit, CycleFlow *flow, size_t period, bool is_stable) {
     const double start = 1e-6;
     double y[STATE];
-    for (size_t i = 0; i < search->size; i++)
-        y[i] = search->y[i] + draw(-1, 1) * start * search->scales[i];
-    cycle_flow_restore(flow);
-    cycle_flow_set(flow, y);
+    for (size_t i = 0; i < orbit->size; i++)
+        y[i] = orbit->y[i] + draw(-1, 1) * start * orbit->scales[i];
+    cycle_flow_restore(flow, y);
     size_t quiet = 0;
     for (size_t i = 0; i < CYCLES; i += period) {
         assert_int_equal(cycle_flow_run(flow, period, NULL, 0, NULL), STATUS_OK);
         cycle_flow_get(flow, y);
-        const double distance = distance_of(search, y);
+        const double distance = distance_of(orbit, y);
         if (!is_stable && distance > 10 * start)
             return true;
         quiet = distance < start / 10 ? quiet + 1 : 0;
@@ -150,36 +146,33 @@ int main(int argc, char **argv) {
     source = argc > 2 ? strtoul(argv[2], NULL, 10) : 7;
     while (counts[0] + counts[1] < orbits) {
         CycleFlow *flow = draw_flow();
-        OrbitSearch search;
-        size_t period = 0;
-        bool is_found = false;
+        const Orbit *orbit = cycle_flow_orbit(flow);
         scenes++;
-        assert_true(cycle_flow_size(flow) <= STATE);
-        assert_int_equal(orbit_search_make(&search, cycle_flow_size(flow), 8), STATUS_OK);
+        assert_true(orbit->size <= STATE);
         if (scenes % 2 == 0) {
-            assert_int_equal(orbit_search_settle(&search, flow, 200, &period, &problem), STATUS_OK);
-            is_found = period > 0;
+            assert_int_equal(cycle_flow_settle(flow, 200, 8), STATUS_OK);
         } else {
-            period = 1 + (size_t)draw(0, 2.5);
+            const size_t period = 1 + (size_t)draw(0, 2.5);
             assert_int_equal(cycle_flow_run(flow, 100 + (size_t)draw(0, 20), NULL, 0, NULL),
                              STATUS_OK);
             assert_int_equal(cycle_flow_shift(flow, false), STATUS_OK);
             if (cycle_flow_is_flying(flow))
-                assert_int_equal(orbit_search_shoot(&search, flow, period, &is_found, &problem),
-                                 STATUS_OK);
+                assert_int_equal(cycle_flow_shoot(flow, period), STATUS_OK);
         }
-        const double radius = is_found ? orbit_search_radius(&search) : 1;
+        const size_t period = orbit->period;
+        const bool is_found = period > 0;
+        const double radius = is_found ? cycle_flow_radius(flow) : 1;
         if (is_found && fabs(radius - 1) < NEAR_ONE) {
             near_one++;
         } else if (is_found) {
             const bool is_stable = radius < 1;
             counts[is_stable]++;
-            if (!orbit_behaves(&search, flow, period, is_stable)) {
+            if (!orbit_behaves(orbit, flow, period, is_stable)) {
                 printf("scene %zu: radius %.6g, period %zu: wrong\n", scenes, radius, period);
                 wrong[is_stable]++;
             }
             if (cycle_flow_is_linearised(flow)) {
-                const double difference = difference_of(&search, flow, period);
+                const double difference = difference_of(orbit, flow, period);
                 not_smooth += isnan(difference) ? 1 : 0;
                 if (difference > 1e-5)
                     printf("scene %zu: radius %.6g, period %zu: difference %.3g\n", scenes, radius,
@@ -187,7 +180,6 @@ int main(int argc, char **argv) {
                 worst = fmax(worst, difference);
             }
         }
-        orbit_search_clear(&search);
         cycle_flow_free(flow);
     }
     printf("%zu stable orbits (%zu do not attract), %zu unstable (%zu do not repel), %zu with a "

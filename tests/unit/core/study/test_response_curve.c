@@ -57,8 +57,8 @@ TEST(a_curve_has_orbits_with_their_stability_and_sections_between) {
     ResponseCurve *curve = curve_of(&request);
     size_t periodic = 0, aperiodic = 0;
     assert_int_equal(curve->points.count, 21);
-    assert_int_equal(curve->runs, 21);
-    assert_int_equal(curve->failed, 0);
+    assert_int_equal(curve->made.runs, 21);
+    assert_int_equal(curve->made.failed, 0);
     for (size_t i = 0; i < curve->points.count; i++) {
         const ResponsePoint *point = &curve->points.at[i];
         assert_int_equal(point->index, i);
@@ -122,10 +122,10 @@ TEST(a_point_that_fails_is_counted_with_its_reason) {
     axis_set(&request, "/dampers/0/clearance", -0.01, 0.01, 5);
     ResponseCurve *curve = curve_of(&request);
     assert_int_equal(curve->points.count, 5);
-    assert_int_equal(curve->failed, 2);
-    assert_int_equal(curve->failures.count, 1);
-    assert_string_equal(curve->failures.at[0].reason, "invalid");
-    assert_int_equal(curve->failures.at[0].count, 2);
+    assert_int_equal(curve->made.failed, 2);
+    assert_int_equal(curve->made.failures.count, 1);
+    assert_string_equal(curve->made.failures.at[0].reason, "invalid-scene");
+    assert_int_equal(curve->made.failures.at[0].count, 2);
     assert_true(isnan(curve->points.at[0].peak_displacement));
     assert_int_equal(curve->points.at[0].stable, CHOICE_ABSENT);
     assert_true(curve->points.at[4].peak_displacement > 0);
