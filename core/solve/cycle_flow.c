@@ -20,7 +20,7 @@
 #include "core/solve/simd_kernels.h"
 
 enum { PARTS = 16 }; // of a cycle, at which the section may be
-enum { NEWTON_STEPS = 20, FIRST_TRY = 4, WARM_UP = 8, PATIENCE = 9 };
+enum { NEWTON_STEPS = 12, FIRST_TRY = 4, WARM_UP = 8, PATIENCE = 4 };
 
 static const double CLOSED = 1e-13; // change by the map at an orbit
 static const double CLOSE = 1e-8;   // a step so small ends at the orbit, but for its square
@@ -475,18 +475,26 @@ Status cycle_flow_shoot(CycleFlow *flow, size_t period) {
     return orbit->period > 0 ? cycle_flow_multiply(flow) : status;
 }
 
-// Whether the last `count` sections of the history return to an orbit that attracts. Else *stay is
-// the number of cycles that the motion stays near an unstable one, 0: there is none.
+// What an orbit beside an aperiodic motion lets expect of it.
+typedef struct CycleFlowOutlook {
+    double stay;     // cycles that it takes to leave the orbit, or to reach it; 0: it is not near
+    bool has_stable; // the orbit is stable, so that the motion may end on it
+} CycleFlowOutlook;
+
+// Searches an orbit that attracts the motion and to which the last `count` sections of the history
+// return; at the end also one of a single cycle anywhere.
 static Status cycle_flow_try(CycleFlow *flow, size_t count, size_t max_period, bool is_last,
-                             double *stay) {
+                             CycleFlowOutlook *outlook) {
     Orbit *orbit = &flow->orbit;
     const size_t rows = max_period + 1, n = orbit->size;
     const double *now = flow->history + count % rows * n;
-    *stay = 0;
+    *outlook = (CycleFlowOutlook){0};
     cycle_flow_scale(flow);
     for (size_t p = 1; p <= max_period && p <= count; p++) {
-        if (!(cycle_flow_distance(orbit, now, flow->history + (count - p) % rows * n) <=
-              RETURNED[is_last]))
+        const bool returns =
+            cycle_flow_distance(orbit, now, flow->history + (count - p) % rows * n) <=
+            RETURNED[is_last];
+        if (!returns && !(is_last && p == 1))
             continue;
         cycle_flow_get(flow, flow->first);
         TRY(cycle_flow_shoot(flow, p));
@@ -494,10 +502,15 @@ static Status cycle_flow_try(CycleFlow *flow, size_t count, size_t max_period, b
             continue;
         const double radius = cycle_flow_radius(flow),
                      distance = cycle_flow_distance(orbit, orbit->y, flow->first);
-        if (radius <= STABLE && distance <= MOVED[is_last])
+        const bool is_stable = radius <= STABLE, is_near = distance <= MOVED[is_last];
+        if (is_stable && is_near && returns)
             return STATUS_OK;
-        if (distance <= MOVED[is_last])
-            *stay = fmax(*stay, (double)p * log(1 / fmax(distance, DBL_EPSILON)) / log(radius));
+        // Beside a neutral one it may stay for ever.
+        if (is_near && !(fabs(radius - 1) < STABLE - 1))
+            outlook->stay =
+                fmax(outlook->stay,
+                     (double)p * -log(is_stable ? RETURNED[0] : distance) / fabs(log(radius)));
+        outlook->has_stable = outlook->has_stable || is_stable;
         orbit->period = 0;
         cycle_flow_restore(flow, NULL);
     }
@@ -506,28 +519,31 @@ static Status cycle_flow_try(CycleFlow *flow, size_t count, size_t max_period, b
 
 Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period) {
     const bool needs_flight = !cycle_flow_is_linearised(flow);
-    const size_t size = flow->orbit.size;
+    const double patience = PATIENCE * (double)cycles;
+    Orbit *orbit = &flow->orbit;
     size_t next = FIRST_TRY, end = cycles;
-    flow->orbit.period = 0;
-    flow->orbit.is_settled = true;
+    orbit->period = 0;
+    orbit->is_settled = true;
     if (needs_flight)
         TRY(cycle_flow_shift(flow, false));
     for (size_t count = 0;; count++) {
         const bool is_last = count >= end;
-        cycle_flow_get(flow, flow->history + count % (max_period + 1) * size);
+        cycle_flow_get(flow, flow->history + count % (max_period + 1) * orbit->size);
         if (is_last && needs_flight)
             TRY(cycle_flow_shift(flow, false));
         if ((count >= next || is_last) && (!needs_flight || cycle_flow_is_flying(flow))) {
-            double stay;
-            TRY(cycle_flow_try(flow, count, max_period, is_last, &stay));
+            CycleFlowOutlook outlook;
+            TRY(cycle_flow_try(flow, count, max_period, is_last, &outlook));
             next *= 2;
-            if (is_last && end == cycles && stay > 0) {
-                const double patience = PATIENCE * (double)cycles;
-                flow->orbit.is_settled = stay <= patience;
-                end += (size_t)ceil(fmin(stay, patience));
+            if (is_last && orbit->period == 0) {
+                orbit->is_settled = orbit->is_settled && !outlook.has_stable;
+                if (end == cycles && outlook.stay > 0) {
+                    orbit->is_settled = outlook.stay <= patience;
+                    end += (size_t)ceil(fmin(outlook.stay, patience));
+                }
             }
         }
-        if (count >= end || flow->orbit.period > 0)
+        if (count >= end || orbit->period > 0)
             return STATUS_OK;
         TRY(cycle_flow_run(flow, 1, NULL, 0, NULL));
     }

@@ -101,7 +101,7 @@ typedef struct CurveWork {
     size_t size; // of the state
     double *block, *z, *at, *tangent, *by_value, *matrix;
     size_t unsettled_count;
-    char unsettled[64]; // numbers of the first of these points
+    char unsettled[256]; // numbers of the first of these points
 } CurveWork;
 
 static double curve_frequency(const Simulation *simulation) {

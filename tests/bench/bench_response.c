@@ -88,6 +88,7 @@ int main(void) {
     static const ResponseCase cases[] = {
         {"spring_damper", 0.61, 0.025, 2, 6, 400, 0},
         {"spring_damper", 0.61, 0.025, 2, 6, 400, 64},
+        {"spring_damper", 0.46, 0.0003, 2, 6, 400, 0},
         {"spring_damper", 0.46, 0.0003, 2, 6, 400, 64},
         {"impulse", 0.61, 0.025, 2, 6, 400, 64},
         {"spring_damper", 0.61, 0.025, 4.1, 4.6, 400, 64},
