@@ -12,7 +12,8 @@
 // Coefficients in s = t / length, 0 <= s <= 1.
 typedef struct TaylorStep {
     double length;                          // [s]
-    double rho;                             // length * rate, the base's included, at most 1
+    double rho;                             // length * rate, the base's included, at most 2
+    double last_rho;                        // of the last step as it was made: that of `degree`
     size_t degree;                          // of q and r; forces have one less
     double base[POLYNOMIAL_DEGREE_MAX + 1]; // a_g
     size_t base_degree;                     // no coefficient of a_g beyond it
@@ -28,7 +29,7 @@ typedef struct TaylorStep {
 Status taylor_step_allocate(TaylorStep *arc, const ModalState *state, Problem *problem);
 void taylor_step_clear(TaylorStep *arc);
 
-// From the present state; length * modal_state_rate() and length * slice->omega must be at most 1.
+// From the present state; length * modal_state_rate() and length * slice->omega must be at most 2.
 void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *slice, double length);
 
 // Reduces the step to 0 to s, and scales the series so that s = 1 is its end again.

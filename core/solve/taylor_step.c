@@ -155,7 +155,9 @@ void taylor_step_make(TaylorStep *arc, const ModalState *state, const Slice *sli
     const size_t n = state->padded, m = state->dampers;
     arc->length = length;
     arc->rho = length * fmax(modal_state_rate(state), slice->omega);
-    arc->degree = linear_motion_degree(arc->rho);
+    if (arc->rho != arc->last_rho)
+        arc->degree = linear_motion_degree(arc->rho);
+    arc->last_rho = arc->rho;
     linear_motion_base_series(arc->base, arc->degree, slice, length);
     arc->base_degree = slice->omega > 0 ? arc->degree : 1;
     double *speed = arc->work, *elastic = arc->work + n, *push = arc->push;
