@@ -97,6 +97,31 @@ TEST(up_and_down_part_where_two_motions_are_stable) {
     variant_free(&curve->variant);
 }
 
+// From 4.6 Hz on the orbit is unstable, but it takes hundreds of cycles to leave it.
+TEST(a_motion_beside_an_unstable_orbit_is_given_the_time_to_leave_it) {
+    StudyRequest request = request_make(4);
+    axis_set(&request, "/excitation/frequency", 4.3, 4.625, 14);
+    ResponseCurve *curve = curve_of(&request);
+    assert_int_equal(curve->points.at[10].period, 1);
+    assert_int_equal(curve->points.at[13].period, COUNT_ABSENT);
+    assert_true(curve->points.at[13].lyapunov > 0.3);
+    assert_true(curve->points.at[13].peak_displacement > 0.005);
+    assert_int_equal(curve->made.warnings.count, 0);
+    variant_free(&curve->variant);
+}
+
+// From rest the motion is chaotic beside the same orbit where that is stable.
+TEST(points_that_may_still_be_transients_are_named) {
+    StudyRequest request = request_make(4);
+    axis_set(&request, "/excitation/frequency", 4.5, 4.65, 4);
+    ResponseCurve *curve = curve_of(&request);
+    assert_int_equal(curve->points.at[0].period, COUNT_ABSENT);
+    assert_int_equal(curve->made.warnings.count, 1);
+    assert_string_equal(curve->made.warnings.at[0].pointer, "/study/settle_cycles");
+    assert_non_null(strstr(curve->made.warnings.at[0].detail, "with index 0"));
+    variant_free(&curve->variant);
+}
+
 TEST(a_continuation_follows_a_branch_through_a_fold) {
     StudyRequest request = request_make(4);
     study_of(&request)->continuation = true;
