@@ -186,10 +186,9 @@ static Status run_scene(const char *path, const Bytes *text, void *of, Problem *
     Status status = scene_prepare(path, text, &(RecordFiles){settings->record, settings->unit},
                                   &limits, &request, &warnings, problem);
     if (status == STATUS_OK && request.study != NULL)
-        status =
-            problem_add(problem, STATUS_INVALID, "/study",
-                        "is not for `run`, which runs the scene alone: `impactd study` makes it, "
-                        "or a server; `impactd tradeoff` and `impactd ensemble` print theirs");
+        status = problem_add(problem, STATUS_INVALID, "/study",
+                             "is not for `run`, which runs the scene alone: `impactd study` makes "
+                             "it, or a server");
     // Before the run, so that a wrong folder is reported at once.
     if (status == STATUS_OK)
         status = output_open(settings->output, problem);
@@ -849,7 +848,7 @@ const Command command_response = {
 };
 
 static const PrintTableView fragility_view = {
-    .skipped = (const char *const[]){"kind", "curves", NULL},
+    .skipped = (const char *const[]){"kind", "curves", "fractiles", NULL},
     .lists =
         (const PrintTableColumns[]){{"limits",
                                      {"metric", "value", "exceeded", "median", "median_interval_95",
