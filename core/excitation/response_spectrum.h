@@ -11,7 +11,7 @@
 // `count` periods from the first to the last, at equal ratios [s].
 void response_spectrum_periods(double from, double to, size_t count, double *periods);
 
-// Steps of all oscillators, of about 7 ns of CPU each.
+// Steps of all oscillators, of about 10 ns of CPU each.
 double response_spectrum_steps(const double *periods, size_t period_count, size_t sample_count,
                                double interval);
 
@@ -23,10 +23,5 @@ double response_spectrum_steps(const double *periods, size_t period_count, size_
 Status response_spectrum_make(const Reals *samples, double interval, double damping_ratio,
                               const double *periods, size_t period_count, const Progress *progress,
                               double *displacement);
-
-// The same of one oscillator, as pseudo-acceleration omega^2 |x| [m/s^2].
-Status response_spectrum_acceleration(const Reals *samples, double interval, double damping_ratio,
-                                      double period, const Progress *progress,
-                                      double *acceleration);
 
 #endif

@@ -14,7 +14,7 @@
 
 enum { COST_RECORDS = 16, NAMES_SHOWN = 3 };
 
-static const double oscillator_step = 0.25; // CPU of one, in solver steps
+static const double oscillator_step = 0.35; // CPU of one, in solver steps
 static const double confidence = 0.95;
 static const char *const fragility_measure_names[] = {"pga", NULL};
 
@@ -289,11 +289,14 @@ static Status fragility_measure(FragilityWork *work, const StudyTools *tools, Pr
         TRY(text_copy(record->name, &curve->record));
         curve->intensity = record->peak;
         TRY(study_advance(tools->progress, (double)i / (double)count, problem));
-        if (!isnan(intensity->period) &&
-            response_spectrum_acceleration(&record->samples, record->interval,
-                                           intensity->damping_ratio, intensity->period,
-                                           tools->progress, &curve->intensity) != STATUS_OK)
-            return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+        if (!isnan(intensity->period)) {
+            const double omega = 6.28318530717958647693 / intensity->period;
+            if (response_spectrum_make(&record->samples, record->interval, intensity->damping_ratio,
+                                       &intensity->period, 1, tools->progress,
+                                       &curve->intensity) != STATUS_OK)
+                return problem_set(problem, STATUS_CANCELLED, "the study was stopped");
+            curve->intensity *= omega * omega;
+        }
         if (!(curve->intensity > 0) || !isfinite(curve->intensity))
             return problem_set(problem, STATUS_UNSTABLE,
                                "the intensity of the record %.64s is %g m/s^2, which no factor "

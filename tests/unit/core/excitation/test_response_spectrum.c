@@ -98,10 +98,6 @@ TEST(a_spectrum_of_a_step_has_its_closed_form) {
         const double end = periods[i] <= 2 ? 2 * rest : 2 * rest * fabs(sin(omega / 2));
         assert_true(fabs(found[i] / end - 1) < 1e-13);
     }
-    double acceleration;
-    assert_int_equal(response_spectrum_acceleration(&samples, 0.5, 0, 1, NULL, &acceleration),
-                     STATUS_OK);
-    assert_true(fabs(acceleration - 4) < 1e-12);
 }
 
 TEST(a_base_at_rest_has_a_spectrum_of_zeros) {
