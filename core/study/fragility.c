@@ -1,6 +1,6 @@
 // Run r levels + l is record r, scaled to level l. A limit is exceeded somewhere between the last
 // level below its first exceedance and that level (a curve may fall again); the lognormal
-// distribution of these levels is fitted to the intervals (lognormal_fit.h). Runs that failed say
+// distribution of these levels is fitted to the intervals (statistics.h). Runs that failed say
 // nothing: they widen an interval.
 #include "core/study/fragility.h"
 
@@ -10,7 +10,6 @@
 
 #include "core/base/json_pointer.h"
 #include "core/excitation/response_spectrum.h"
-#include "core/math/lognormal_fit.h"
 
 enum { COST_RECORDS = 16, NAMES_SHOWN = 3 };
 

@@ -10,7 +10,7 @@
 
 enum { POINTS_INITIAL = 200, POINTS_MAX = 2000 };
 
-static const double steps_max = 1e8, step_seconds = 7e-9;
+static const double steps_max = 1e8, step_seconds = 10e-9;
 
 typedef struct SpectrumRun {
     NamedRecord *named;

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "core/base/philox.h"
-#include "core/math/lognormal_fit.h"
 #include "core/study/statistics.h"
 #include "tests/support/scenes.h"
 #include "tests/support/test.h"

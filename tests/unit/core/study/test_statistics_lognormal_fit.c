@@ -1,6 +1,6 @@
 // Lognormal distributions of censored numbers: exact cases, cases without a maximum, and how often
 // the intervals contain what the numbers were drawn from.
-#include "core/math/lognormal_fit.h"
+#include "core/study/statistics.h"
 
 #include <math.h>
 
