@@ -114,11 +114,7 @@ static const Field ensemble_input_fields[] = {
 static const Field ensemble_index_fields[] = {
     FIELD_TEXT(EnsembleIndex, pointer, 0, PRESENCE_OPTIONAL, 0, "the input, of tied members the first; /excitation/seed stands for the random base"),
     FIELD_CHOICE(EnsembleIndex, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
-    FIELD_COUNT(EnsembleIndex, samples, NULL, AT_MIN(0), 0, "base samples whose runs all ended"),
-    FIELD_REAL(EnsembleIndex, first, NULL, ANY, OPTIONAL, "part of the metric's variance that this input causes alone"),
-    FIELD_REALS_OR_NULL(EnsembleIndex, first_interval_95, NULL, "its 95 % confidence interval; estimates may be below 0 or above 1"),
-    FIELD_REAL(EnsembleIndex, total, NULL, ANY, OPTIONAL, "part that it causes alone and with others"),
-    FIELD_REALS_OR_NULL(EnsembleIndex, total_interval_95, NULL, "its 95 % confidence interval"),
+    FIELD_BASE(EnsembleIndex, sobol, sobol_index_fields),
     FIELD_END
 };
 
@@ -262,31 +258,19 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
                                ensemble_complete_inputs(study, simulation, limits, problem));
 }
 
-// The channel of the displacement over time; NULL: none.
-static const char *ensemble_history_channel(const EnsembleStudy *study,
-                                            const Simulation *simulation) {
-    const Texts *names = &simulation->output.channels;
-    const char *found = NULL;
-    for (size_t i = 0; i < names->count && study->inputs.count > 0; i++) {
-        size_t number;
-        if (channel_find(names->at[i], &number) == &channels[CHANNEL_DISPLACEMENT])
-            found = names->at[i];
-    }
-    return found;
-}
-
-// The scene that all runs start from.
+// The scene that all runs start from, with inputs with the last displacement among its channels.
 static Status ensemble_base(const EnsembleStudy *study, const Simulation *simulation,
                             Simulation *base) {
-    const char *history = ensemble_history_channel(study, simulation);
+    const Texts *names = &simulation->output.channels;
     TRY(study_run_copy(simulation, base));
-    return history != NULL ? texts_append(&base->output.channels, history) : STATUS_OK;
-}
-
-static Status ensemble_model(const EnsembleStudy *study, const Simulation *simulation,
-                             InputModel *model) {
-    return input_model_make(&study->inputs, simulation, study->sampling, study->first_seed,
-                            (size_t)study->runs, study->sobol_indices ? 2 : 1, model);
+    for (size_t i = 0; i < names->count && study->inputs.count > 0; i++) {
+        size_t number;
+        if (channel_find(names->at[i], &number) != &channels[CHANNEL_DISPLACEMENT])
+            continue;
+        texts_clear(&base->output.channels);
+        TRY(texts_append(&base->output.channels, names->at[i]));
+    }
+    return STATUS_OK;
 }
 
 // Draws table 0 of a row, of inputs `mixed` table 1.
@@ -301,58 +285,19 @@ static Status ensemble_draw(const InputModel *model, size_t row, bool is_second,
     return status;
 }
 
-// What makes the scenes of draws, to estimate their cost.
-typedef struct EnsembleScenes {
-    const Simulation *base;
-    InputModel model; // none: all are the base
-} EnsembleScenes;
-
-static Status ensemble_scene_of(const void *of, size_t row, const SimulationLimits *limits,
-                                Simulation *scene) {
-    const EnsembleScenes *scenes = of;
-    double values[INPUT_NUMBERS_MAX];
-    uint64_t again[INPUT_NUMBERS_MAX] = {0};
-    if (scenes->model.count == 0)
-        return fields_copy(simulation_fields, scenes->base, scene);
-    TRY(ensemble_draw(&scenes->model, row, false, SIZE_MAX, values, again, NULL));
-    return input_model_scene(&scenes->model, values, scenes->base, limits, scene, NULL);
-}
-
-// Of all runs: how many of them a target needs is unknown before the first are made.
-static Status ensemble_cost(const void *request, const Simulation *simulation,
-                            const SimulationLimits *limits, double *steps) {
-    const EnsembleStudy *study = request;
-    Simulation base;
-    EnsembleScenes scenes = {.base = &base};
-    *steps = 0;
-    Status status = ensemble_base(study, simulation, &base);
-    if (status == STATUS_OK)
-        status = input_model_make(&study->inputs, &base, SAMPLING_RANDOM, study->first_seed,
-                                  (size_t)study->runs, 1, &scenes.model);
-    if (status == STATUS_OK)
-        status = study_sample_cost(ensemble_scene_of, &scenes, (size_t)study->runs,
-                                   study->inputs.count > 0 ? COST_SAMPLES : 1, limits, steps);
-    *steps *= (double)ensemble_sample_runs(study, simulation);
-    input_model_clear(&scenes.model);
-    simulation_clear(&base);
-    return status;
-}
-
 typedef struct EnsembleWork {
     StudyWork work;
     const EnsembleStudy *study;
     Ensemble *answer;
     bool has_force, is_random;
     SpectrumAccumulator sums;
-    Spectrum like; // of the first run that ended
-    size_t kept;   // runs whose spectra are kept
-    size_t check;  // ended runs at the next check of the target
+    size_t kept;  // runs whose spectra are kept
+    size_t check; // ended runs at the next check of the target
     Simulation base;
     InputModel model;
     size_t each, indexed;        // runs of one base sample, and its inputs
     double *values;              // metrics of each member, for Sobol indices
     SpectrumAccumulator history; // displacements over time, as if they were spectra
-    Spectrum history_like;       // of the first run that ended
 } EnsembleWork;
 
 typedef struct EnsemblePart {
@@ -398,6 +343,49 @@ static Status ensemble_scene(const void *of, size_t member, Simulation *scene, S
     if (work->is_random)
         ((ExcitationRandom *)(void *)scene->scene.excitation)->seed = place.seed;
     return STATUS_OK;
+}
+
+// What scenes need; cleared by the next.
+static Status ensemble_work_make(EnsembleWork *work, const EnsembleStudy *study,
+                                 const Simulation *simulation, const SimulationLimits *limits) {
+    work->study = study;
+    work->work.limits = limits;
+    work->is_random = ensemble_is_random(simulation);
+    work->each = ensemble_sample_runs(study, simulation);
+    work->work.members = (size_t)study->runs * work->each;
+    TRY(ensemble_base(study, simulation, &work->base));
+    return input_model_make(&study->inputs, &work->base, study->sampling, study->first_seed,
+                            (size_t)study->runs, study->sobol_indices ? 2 : 1, &work->model);
+}
+
+static void ensemble_free(void *of) {
+    EnsembleWork *work = of;
+    spectrum_accumulator_clear(&work->sums);
+    spectrum_accumulator_clear(&work->history);
+    simulation_clear(&work->base);
+    input_model_clear(&work->model);
+    free(work->values);
+}
+
+static Status ensemble_scene_of(const void *work, size_t member, const SimulationLimits *limits,
+                                Simulation *scene) {
+    EnsemblePart part = {.again = {0}};
+    (void)limits;
+    const Status status = ensemble_scene(work, member, scene, &part.part, NULL);
+    free(part.part.run.inputs.at);
+    return status;
+}
+
+// Of all runs: how many of them a target needs is unknown before the first are made.
+static Status ensemble_cost(const void *request, const Simulation *simulation,
+                            const SimulationLimits *limits, double *steps) {
+    EnsembleWork work = {.check = 0};
+    Status status = ensemble_work_make(&work, request, simulation, limits);
+    if (status == STATUS_OK)
+        status = study_sample_cost(ensemble_scene_of, &work, work.work.members,
+                                   work.model.count > 0 ? COST_SAMPLES : 1, limits, steps);
+    ensemble_free(&work);
+    return status;
 }
 
 // Keeps the displacement at equally spaced times.
@@ -487,17 +475,6 @@ static size_t ensemble_kept(const EnsembleStudy *study, double densities) {
     return kept > min ? kept : min;
 }
 
-// Adds to the sums; the first one is also moved to `like`.
-static Status ensemble_sum(SpectrumAccumulator *sums, size_t kept, Spectrum *spectrum,
-                           Spectrum *like) {
-    TRY(spectrum_accumulator_add(sums, spectrum, kept));
-    if (like->densities.count == 0) {
-        *like = *spectrum;
-        *spectrum = (Spectrum){0};
-    }
-    return STATUS_OK;
-}
-
 // Adds a row, after a run that may have failed.
 static Status ensemble_fold_row(EnsembleWork *work, uint64_t seed, StudyPart *made) {
     Ensemble *answer = work->answer;
@@ -508,9 +485,9 @@ static Status ensemble_fold_row(EnsembleWork *work, uint64_t seed, StudyPart *ma
     TRY(run_table_add(&answer->table, &made->run, seed));
     if (has_failed)
         return STATUS_OK;
-    TRY(ensemble_sum(&work->history, ensemble_kept(work->study, HISTORY_POINTS), &part->history,
-                     &work->history_like));
-    return ensemble_sum(&work->sums, work->kept, &made->spectrum, &work->like);
+    TRY(spectrum_accumulator_add(&work->history, &part->history,
+                                 ensemble_kept(work->study, HISTORY_POINTS)));
+    return spectrum_accumulator_add(&work->sums, &made->spectrum, work->kept);
 }
 
 static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
@@ -562,19 +539,13 @@ static Status ensemble_add_index(const EnsembleWork *work, int metric, size_t in
     const UncertainInputs *inputs = &work->study->inputs;
     const SobolRuns runs = {work->values + metric, STATISTICS_METRICS, (size_t)work->study->runs,
                             work->indexed};
-    SobolIndex estimate;
-    sobol_index_estimate(&runs, input, &estimate);
     EnsembleIndex *index = list_append(&work->answer->indices, sizeof *index);
     TRY(status_made(index != NULL));
-    *index = (EnsembleIndex){.metric = metric,
-                             .samples = estimate.count,
-                             .first = estimate.first,
-                             .total = estimate.total};
+    index->metric = metric;
     TRY(text_copy(input < inputs->count ? study_axis_pointer(&inputs->at[input].axis, 0)
                                         : "/excitation/seed",
                   &index->pointer));
-    TRY(study_copy_reals(estimate.first_interval, 2, &index->first_interval_95));
-    return study_copy_reals(estimate.total_interval, 2, &index->total_interval_95);
+    return sobol_index_estimate(&runs, input, &index->sobol);
 }
 
 static Status ensemble_add_indices(const EnsembleWork *work, const StudyTools *tools,
@@ -599,34 +570,18 @@ static Status ensemble_end(void *of, const StudyTools *tools, Problem *problem) 
     statistics_trust(&answer->table, &answer->trust);
     TRY(study_runs_warn(&answer->made));
     TRY(ensemble_add_indices(work, tools, problem));
-    TRY(spectrum_accumulator_report(&work->history, &work->history_like, SPECTRUM_QUANTILES,
-                                    tools->progress, &answer->time, &answer->displacement,
-                                    problem));
+    TRY(spectrum_accumulator_report(&work->history, NULL, SPECTRUM_QUANTILES, tools->progress,
+                                    &answer->time, &answer->displacement, problem));
     return spectrum_accumulator_report(
-        &work->sums, &work->like,
-        SPECTRUM_INTERVALS | (work->model.count > 0 ? SPECTRUM_QUANTILES : 0), tools->progress,
-        &answer->frequency, &answer->spectra, problem);
+        &work->sums, NULL, SPECTRUM_INTERVALS | (work->model.count > 0 ? SPECTRUM_QUANTILES : 0),
+        tools->progress, &answer->frequency, &answer->spectra, problem);
 }
 
-static void ensemble_free(void *of) {
-    EnsembleWork *work = of;
-    spectrum_clear(&work->like);
-    spectrum_clear(&work->history_like);
-    spectrum_accumulator_clear(&work->sums);
-    spectrum_accumulator_clear(&work->history);
-    simulation_clear(&work->base);
-    input_model_clear(&work->model);
-    free(work->values);
-}
-
-// What uncertain inputs need; nothing without.
+// What the answer says of uncertain inputs; nothing without.
 static Status ensemble_begin_inputs(EnsembleWork *work) {
     const EnsembleStudy *study = work->study;
     Ensemble *answer = work->answer;
     answer->sampling = study->sampling;
-    if (study->inputs.count == 0)
-        return STATUS_OK;
-    TRY(ensemble_model(study, &work->base, &work->model));
     for (size_t i = 0; i < work->model.count; i++) {
         const InputNumber *number = &work->model.numbers[i];
         const char *pointer = study_axis_pointer(&number->input->axis, 0),
@@ -648,18 +603,14 @@ static Status ensemble_begin_inputs(EnsembleWork *work) {
 
 static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem) {
     EnsembleWork *work = of;
-    const EnsembleStudy *study = work->study = work->work.study;
+    const EnsembleStudy *study = work->work.study;
     Ensemble *answer = work->answer = work->work.answer;
     const double densities = study_run_densities(work->work.simulation);
-    (void)tools;
     (void)problem;
     work->has_force = simulation_has_force(work->work.simulation);
-    work->is_random = ensemble_is_random(work->work.simulation);
     work->check = STOPPING_RULE_PILOT;
-    work->each = ensemble_sample_runs(study, work->work.simulation);
     work->kept = ensemble_kept(study, densities);
-    work->work.members = (size_t)study->runs * work->each;
-    TRY(ensemble_base(study, work->work.simulation, &work->base));
+    TRY(ensemble_work_make(work, study, work->work.simulation, tools->limits));
     TRY(ensemble_begin_inputs(work));
     if (ensemble_has_target(work) && study->runs > STOPPING_RULE_PILOT)
         work->work.wanted = STOPPING_RULE_PILOT;

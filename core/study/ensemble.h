@@ -49,9 +49,7 @@ typedef struct EnsembleInput {
 typedef struct EnsembleIndex {
     char *pointer;
     int metric; // StatisticsMetric
-    uint64_t samples;
-    double first, total;
-    Reals first_interval_95, total_interval_95;
+    SobolIndex sobol;
 } EnsembleIndex;
 
 // The answer.

@@ -400,13 +400,7 @@ static const Field sensitivity_statistic_fields[] = {
     FIELD_END
 };
 
-static const Field sensitivity_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
-    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
-    FIELD_END
-};
+static const Field sensitivity_failure_fields[] = {STUDY_FAILURE_ROWS("first_run", "the first of them")};
 
 static const Field sensitivity_spectrum_fields[] = {
     FIELD_TEXT(RunSpectrum, channel, 0, PRESENCE_OPTIONAL, 0, "channel"),
@@ -673,9 +667,9 @@ static Status sensitivity_end(void *of, const StudyTools *tools, Problem *proble
     if (work->study->runs == 0)
         return STATUS_OK;
     TRY(sensitivity_fill_statistics(work));
-    return spectrum_accumulator_report(&work->sums, &work->own->spectrum,
-                                       SPECTRUM_VALUE | SPECTRUM_QUANTILES, tools->progress,
-                                       &answer->frequency, &answer->spectra, problem);
+    return spectrum_accumulator_report(&work->sums, &work->own->spectrum, SPECTRUM_QUANTILES,
+                                       tools->progress, &answer->frequency, &answer->spectra,
+                                       problem);
 }
 
 // Why a stop has no closed forms; NULL: it has.

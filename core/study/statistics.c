@@ -326,8 +326,7 @@ static Status spectrum_accumulator_start(SpectrumAccumulator *sums, const Column
     return status_made(sums->mean != NULL && sums->squares != NULL && sums->kept != NULL);
 }
 
-Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spectrum,
-                                size_t kept_max) {
+Status spectrum_accumulator_add(SpectrumAccumulator *sums, Spectrum *spectrum, size_t kept_max) {
     const Columns *densities = &spectrum->densities;
     if (densities->count == 0)
         return STATUS_OK;
@@ -346,7 +345,10 @@ Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spect
             memcpy(sums->kept + (sums->count * sums->channels + c) * sums->rows, from,
                    sums->rows * sizeof *from);
     }
-    sums->count++;
+    if (sums->count++ == 0) {
+        sums->first = *spectrum;
+        *spectrum = (Spectrum){0};
+    }
     return STATUS_OK;
 }
 
@@ -449,13 +451,13 @@ static Status spectrum_accumulator_report_quantiles(const SpectrumAccumulator *s
     return status;
 }
 
-Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like, int what,
+Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *value, int what,
                                    const Progress *progress, Reals *frequency, RunSpectra *spectra,
                                    Problem *problem) {
-    const Columns *densities = &like->densities;
+    const Columns *densities = &sums->first.densities;
     if (sums->count == 0)
         return STATUS_OK;
-    TRY(study_copy_reals(like->frequency, densities->rows, frequency));
+    TRY(study_copy_reals(sums->first.frequency, densities->rows, frequency));
     for (size_t c = 0; c < densities->count; c++) {
         RunSpectrum *spectrum = list_append(spectra, sizeof *spectrum);
         TRY(status_made(spectrum != NULL));
@@ -463,8 +465,8 @@ Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectr
         TRY(text_copy(densities->at[c].unit, &spectrum->unit));
         spectrum->quantile_runs = COUNT_ABSENT;
         TRY(study_copy_reals(sums->mean + c * sums->rows, sums->rows, &spectrum->mean));
-        if ((what & SPECTRUM_VALUE) != 0)
-            TRY(study_copy_reals(densities->at[c].values, sums->rows, &spectrum->value));
+        if (value != NULL)
+            TRY(study_copy_reals(value->densities.at[c].values, sums->rows, &spectrum->value));
         if ((what & SPECTRUM_INTERVALS) != 0)
             TRY(spectrum_accumulator_report_intervals(sums, c, spectrum, problem));
         if ((what & SPECTRUM_QUANTILES) != 0)
@@ -474,6 +476,7 @@ Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectr
 }
 
 void spectrum_accumulator_clear(SpectrumAccumulator *sums) {
+    spectrum_clear(&sums->first);
     free(sums->mean);
     free(sums->squares);
     free(sums->kept);
@@ -514,48 +517,47 @@ static SobolTerms sobol_terms(const SobolSample *sample, double mean) {
     return (SobolTerms){b * change, change * change / 2, (a * a + b * b) / 2};
 }
 
-void sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *index) {
-    const double unknown = (double)NAN;
+// clang-format off
+const Field sobol_index_fields[] = {
+    FIELD_COUNT(SobolIndex, samples, NULL, AT_MIN(0), 0, "base samples whose runs all ended"),
+    FIELD_REAL(SobolIndex, first, NULL, ANY, OPTIONAL, "part of the metric's variance that this input causes alone"),
+    FIELD_REALS_OR_NULL(SobolIndex, first_interval_95, NULL, "its 95 % confidence interval; estimates may be below 0 or above 1"),
+    FIELD_REAL(SobolIndex, total, NULL, ANY, OPTIONAL, "part that it causes alone and with others"),
+    FIELD_REALS_OR_NULL(SobolIndex, total_interval_95, NULL, "its 95 % confidence interval"),
+    FIELD_END
+};
+// clang-format on
+
+Status sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *index) {
     SobolSample sample;
     SobolTerms means = {0, 0, 0};
-    double mean = 0, first_squares = 0, total_squares = 0;
-    size_t count = 0;
-    *index = (SobolIndex){.first = unknown,
-                          .first_interval = {unknown, unknown},
-                          .total = unknown,
-                          .total_interval = {unknown, unknown}};
+    double mean = 0, n = 0, first_squares = 0, total_squares = 0;
+    *index = (SobolIndex){.first = (double)NAN, .total = (double)NAN};
     for (size_t j = 0; j < runs->samples; j++)
-        if (sobol_sample_get(runs, j, input, &sample)) {
-            count++;
-            mean += ((sample.a + sample.b) / 2 - mean) / (double)count;
-        }
-    index->count = count;
+        if (sobol_sample_get(runs, j, input, &sample))
+            mean += ((sample.a + sample.b) / 2 - mean) / ++n;
+    index->samples = (uint64_t)n;
     for (size_t j = 0; j < runs->samples; j++)
         if (sobol_sample_get(runs, j, input, &sample)) {
             const SobolTerms terms = sobol_terms(&sample, mean);
-            means.first += terms.first / (double)count;
-            means.total += terms.total / (double)count;
-            means.variance += terms.variance / (double)count;
+            means.first += terms.first / n;
+            means.total += terms.total / n;
+            means.variance += terms.variance / n;
         }
-    if (count < 2 || !(means.variance > 0) || !isfinite(means.variance))
-        return;
+    if (n < 2 || !(means.variance > 0) || !isfinite(means.variance))
+        return STATUS_OK;
     index->first = means.first / means.variance;
     index->total = means.total / means.variance;
     for (size_t j = 0; j < runs->samples; j++)
         if (sobol_sample_get(runs, j, input, &sample)) {
             const SobolTerms terms = sobol_terms(&sample, mean);
-            const double first = (terms.first - index->first * terms.variance) / means.variance,
-                         total = (terms.total - index->total * terms.variance) / means.variance;
-            first_squares += first * first;
-            total_squares += total * total;
+            first_squares += pow((terms.first - index->first * terms.variance) / means.variance, 2);
+            total_squares += pow((terms.total - index->total * terms.variance) / means.variance, 2);
         }
-    const double n = (double)count,
-                 t = student_t_quantile(STATISTICS_CONFIDENCE, count - 1) / sqrt(n * (n - 1));
-    for (int side = 0; side < 2; side++) {
-        const double width = side == 0 ? -t : t;
-        index->first_interval[side] = index->first + width * sqrt(first_squares);
-        index->total_interval[side] = index->total + width * sqrt(total_squares);
-    }
+    const double t =
+        student_t_quantile(STATISTICS_CONFIDENCE, (size_t)index->samples - 1) / sqrt(n * (n - 1));
+    TRY(study_copy_interval(index->first, t * sqrt(first_squares), &index->first_interval_95));
+    return study_copy_interval(index->total, t * sqrt(total_squares), &index->total_interval_95);
 }
 
 // The lognormal fit. With x = ln of a bound and z = alpha x - gamma, alpha = 1 / beta and gamma =

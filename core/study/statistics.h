@@ -157,6 +157,7 @@ enum {
 typedef struct SpectrumAccumulator {
     size_t channels, rows;
     size_t count;    // runs
+    Spectrum first;  // of the first of them
     double *mean;    // channel by channel
     double *squares; // sums of squared deviations
     size_t kept_max; // runs of which all densities are kept, the first ones
@@ -164,9 +165,8 @@ typedef struct SpectrumAccumulator {
 } SpectrumAccumulator;
 
 // Adds the spectra of a run, of the same shape as those before; the densities of the first
-// `kept_max` runs are kept.
-Status spectrum_accumulator_add(SpectrumAccumulator *sums, const Spectrum *spectrum,
-                                size_t kept_max);
+// `kept_max` runs are kept, and the first spectrum is taken.
+Status spectrum_accumulator_add(SpectrumAccumulator *sums, Spectrum *spectrum, size_t kept_max);
 
 // Spread of the runs: norm of the difference over norm of the mean density, of the channel with the
 // largest error among `all` runs. Needs SPECTRUM_ACCUMULATOR_FIRST kept runs.
@@ -174,14 +174,13 @@ RunSpread spectrum_accumulator_spread(const SpectrumAccumulator *sums, size_t al
 
 // What is reported of the densities beside their mean.
 enum {
-    SPECTRUM_VALUE = 1,     // `like` as the value
-    SPECTRUM_INTERVALS = 2, // deviation and confidence interval of the mean
-    SPECTRUM_QUANTILES = 4, // of the runs kept
+    SPECTRUM_INTERVALS = 1, // deviation and confidence interval of the mean
+    SPECTRUM_QUANTILES = 2, // of the runs kept
 };
 
-// Fills frequencies and spectra. `like` is the spectrum of any of the runs. `progress` may stop the
-// sorting for quantiles.
-Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *like, int what,
+// Fills frequencies and spectra. `value`: of the study's own scene; NULL: none. `progress` may stop
+// the sorting for quantiles.
+Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *value, int what,
                                    const Progress *progress, Reals *frequency, RunSpectra *spectra,
                                    Problem *problem);
 
@@ -198,16 +197,17 @@ typedef struct SobolRuns {
     size_t samples, inputs; // N and k
 } SobolRuns;
 
-// Of one input, each with the interval that contains it with a probability of 95 % (NAN: unknown).
+// Of one input, each with its 95 % confidence interval. NAN and no interval: unknown.
 typedef struct SobolIndex {
-    size_t count; // samples whose runs are all known
-    double first, first_interval[2];
-    double total, total_interval[2];
+    uint64_t samples; // whose runs are all known
+    double first, total;
+    Reals first_interval_95, total_interval_95;
 } SobolIndex;
+extern const Field sobol_index_fields[];
 
-// The indices of an input. All NAN where the results do not differ or fewer than two samples are
-// known.
-void sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *index);
+// The indices of an input into an empty `index`. Unknown where the results do not differ or fewer
+// than two samples are known. STATUS_NO_MEMORY.
+Status sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *index);
 
 // The lognormal distribution of numbers that are known to lie within intervals, by maximum
 // likelihood, with confidence intervals.

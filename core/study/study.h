@@ -130,6 +130,9 @@ static inline Status study_first_failure(Status first, Status second) {
 // A copy of numbers. STATUS_NO_MEMORY, as of all functions below.
 Status study_copy_reals(const double *values, size_t count, Reals *target);
 
+// The two numbers middle -+ half.
+Status study_copy_interval(double middle, double half, Reals *target);
+
 // Appends a number.
 Status study_add_real(double value, Reals *reals);
 

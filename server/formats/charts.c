@@ -274,8 +274,8 @@ static void ensemble_add_indices(Chart *chart, const Ensemble *ensemble) {
     const char **names = chart_new(chart, count, sizeof *names);
     for (size_t i = 0; i < count && !chart->is_failed; i++) {
         const EnsembleIndex *index = &ensemble->indices.at[i];
-        first[i] = index->first;
-        total[i] = index->total;
+        first[i] = index->sobol.first;
+        total[i] = index->sobol.total;
         y[i] = -index->metric;
         names[i] = index->pointer;
     }

@@ -8,12 +8,11 @@
 #include <stdlib.h>
 
 #include "core/study/ensemble.h"
+#include "tests/support/ishigami.h"
 #include "tests/support/scenes.h"
 #include "tests/support/test.h"
 
-#define PI 3.14159265358979323846
-
-enum { INPUTS = 3, RUNS = INPUTS + 2, SAMPLES = 1024 };
+enum { SAMPLES = 1024 };
 
 static unsigned long trials = 10;
 static uint64_t first_seed = 1;
@@ -21,10 +20,11 @@ static Problem problem;
 static double first[INPUTS], total[INPUTS]; // of the case
 static size_t inside[2 * INPUTS];
 
-static void note(size_t input, const double first_interval[2], const double total_interval[2]) {
-    inside[input] += first_interval[0] <= first[input] && first[input] <= first_interval[1];
-    inside[INPUTS + input] +=
-        total_interval[0] <= total[input] && total[input] <= total_interval[1];
+static void note(size_t input, const SobolIndex *index) {
+    bool contains[2];
+    (void)index_contains(index, first[input], total[input], contains);
+    inside[input] += contains[0];
+    inside[INPUTS + input] += contains[1];
 }
 
 // Prints the shares and returns whether all are near 95 %: within 92 and 98 %, and in few trials
@@ -46,43 +46,14 @@ static bool report(const char *name) {
     return is_kept;
 }
 
-// Ishigami and Homma 1990: sin x1 + a sin^2 x2 + b x3^4 sin x1, x within -pi and pi, a = 7, b =
-// 0.1.
-static double ishigami(const double x[INPUTS]) {
-    return sin(x[0]) + 7 * pow(sin(x[1]), 2) + 0.1 * pow(x[2], 4) * sin(x[0]);
-}
-
-// V1 = (1 + b pi^4 / 5)^2 / 2, V2 = a^2 / 8, V13 = 8 b^2 pi^8 / 225.
 static bool try_ishigami(void) {
-    static double values[SAMPLES * RUNS];
-    const double v1 = pow(1 + 0.1 * pow(PI, 4) / 5, 2) / 2, v2 = 49.0 / 8,
-                 v13 = 8 * 0.01 * pow(PI, 8) / 225, v = v1 + v2 + v13;
-    first[0] = v1 / v;
-    first[1] = total[1] = v2 / v;
-    first[2] = 0;
-    total[0] = (v1 + v13) / v;
-    total[2] = v13 / v;
+    ishigami_indices(first, total);
     for (uint64_t seed = first_seed; seed < first_seed + trials; seed++) {
-        Sampling sampling;
-        assert_int_equal(sampling_make(SAMPLING_RANDOM, seed, SAMPLES, 2 * INPUTS, &sampling),
-                         STATUS_OK);
-        for (size_t j = 0; j < SAMPLES; j++)
-            for (size_t run = 0; run < RUNS; run++) {
-                double x[INPUTS];
-                for (size_t i = 0; i < INPUTS; i++) {
-                    const bool is_second = run == 1 || run == 2 + i;
-                    x[i] =
-                        PI *
-                        (2 * sampling_coordinate(&sampling, j, i + (is_second ? INPUTS : 0)) - 1);
-                }
-                values[j * RUNS + run] = ishigami(x);
-            }
-        for (size_t i = 0; i < INPUTS; i++) {
-            SobolIndex index;
-            sobol_index_estimate(&(SobolRuns){values, 1, SAMPLES, INPUTS}, i, &index);
-            note(i, index.first_interval, index.total_interval);
-        }
-        sampling_clear(&sampling);
+        SobolIndex indices[INPUTS];
+        indices_estimate(ishigami, SAMPLING_RANDOM, seed, SAMPLES, indices);
+        for (size_t i = 0; i < INPUTS; i++)
+            note(i, &indices[i]);
+        indices_clear(indices);
     }
     return report("Ishigami function");
 }
@@ -131,7 +102,7 @@ static bool try_scene(void) {
         for (size_t i = 0, found = 0; i < ensemble->indices.count; i++) {
             const EnsembleIndex *index = &ensemble->indices.at[i];
             if (index->metric == STATISTICS_PEAK_ACCELERATION)
-                note(found++, index->first_interval_95.at, index->total_interval_95.at);
+                note(found++, &index->sobol);
         }
         variant_free(answer);
     }

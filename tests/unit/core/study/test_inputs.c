@@ -214,11 +214,13 @@ TEST(sobol_indices_of_a_scene_with_known_variances_are_within_their_intervals) {
             continue;
         const double own = exp(s[found] * s[found]), first = (own - 1) / (q - 1),
                      total = (own - 1) * q / own / (q - 1);
-        assert_true(index->samples == 400 && index->first_interval_95.count == 2);
-        if (!(index->first_interval_95.at[0] < first && first < index->first_interval_95.at[1] &&
-              index->total_interval_95.at[0] < total && total < index->total_interval_95.at[1]))
-            fail_msg("%s: %g %g, should be %g %g", index->pointer, index->first, index->total,
-                     first, total);
+        assert_true(index->sobol.samples == 400 && index->sobol.first_interval_95.count == 2);
+        if (!(index->sobol.first_interval_95.at[0] < first &&
+              first < index->sobol.first_interval_95.at[1] &&
+              index->sobol.total_interval_95.at[0] < total &&
+              total < index->sobol.total_interval_95.at[1]))
+            fail_msg("%s: %g %g, should be %g %g", index->pointer, index->sobol.first,
+                     index->sobol.total, first, total);
         found++;
     }
     assert_int_equal(found, 3);
@@ -240,7 +242,7 @@ TEST(under_a_random_base_the_seed_is_an_input_of_the_indices) {
         if (index->metric != STATISTICS_RMS_DISPLACEMENT)
             continue;
         const bool is_seed = strcmp(index->pointer, "/excitation/seed") == 0;
-        assert_true(is_seed ? index->total > 0.5 : index->total < 0.1);
+        assert_true(is_seed ? index->sobol.total > 0.5 : index->sobol.total < 0.1);
     }
     variant_free(&answer->variant);
     study_request_clear(&inquiry);
