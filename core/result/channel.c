@@ -17,7 +17,7 @@ const Channel channels[CHANNEL_COUNT] = {
     [CHANNEL_CONTACT_FORCE]       = {"contact_force", "N", "N^2/Hz", "on the structure, positive to the right", CHANNEL_OF_DAMPER},
     [CHANNEL_BASE_ACCELERATION]   = {"base_acceleration", "m/s^2", "(m/s^2)^2/Hz", "of the base", CHANNEL_OF_BASE},
     [CHANNEL_STOREY_DRIFT]        = {"storey_drift", "m", "m^2/Hz", "displacement of a frame's storey less that of the storey below, of the first one relative to the base", CHANNEL_OF_STOREY},
-    [CHANNEL_BASE_SHEAR]          = {"base_shear", "N", "N^2/Hz", "force of the structure's springs and dashpots on the base, positive to the right", CHANNEL_OF_BASE},
+    [CHANNEL_BASE_SHEAR]          = {"base_shear", "N", "N^2/Hz", "force of the structure's springs and dashpots on the base, positive to the right; modes that accuracy.modes leaves out move with the base and load it with their mass", CHANNEL_OF_BASE},
 };
 
 const char *const channel_requests[] = {

@@ -209,10 +209,8 @@ static void run_aggregate_order(double quantile, const double *sorted, size_t co
         if (sum >= 1 - tail && i < count && isnan(interval[1]))
             interval[1] = sorted[i];
     }
-    if (isnan(interval[0]))
-        interval[1] = (double)NAN;
-    if (isnan(interval[1]))
-        interval[0] = (double)NAN;
+    if (isnan(interval[0]) || isnan(interval[1]))
+        interval[0] = interval[1] = (double)NAN;
 }
 
 void run_aggregate_interval(const RunAggregate *aggregate, double *values, size_t count,
@@ -242,10 +240,11 @@ static uint64_t statistics_find_run(const RunTable *table, int metric, double va
 }
 
 Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic) {
+    static const double shares[] = {0, 0.05, 0.16, 0.25, 0.5, 0.75, 0.84, 0.95, 1};
+    const char *unit = study_metric_unit(metric);
     Values values;
     free(statistic->unit);
     statistic->metric = metric;
-    const char *unit = fields_find(summary_fields, statistics_metric_names[metric], NULL)->unit;
     TRY(text_copy(unit != NULL ? unit : "1", &statistic->unit));
     TRY(statistics_collect(table, metric, &values));
     const size_t count = values.count;
@@ -259,20 +258,11 @@ Status statistics_fill(const RunTable *table, int metric, RunStatistic *statisti
         statistic->low = values.mean - half;
         statistic->high = values.mean + half;
     }
-    if (count > 0) {
-        reals_sort(values.at, count);
-        statistic->minimum = values.at[0];
-        statistic->q05 = statistics_quantile(values.at, count, 0.05);
-        statistic->q16 = statistics_quantile(values.at, count, 0.16);
-        statistic->q25 = statistics_quantile(values.at, count, 0.25);
-        statistic->median = statistics_quantile(values.at, count, 0.5);
-        statistic->q75 = statistics_quantile(values.at, count, 0.75);
-        statistic->q84 = statistics_quantile(values.at, count, 0.84);
-        statistic->q95 = statistics_quantile(values.at, count, 0.95);
-        statistic->maximum = values.at[count - 1];
-        statistic->minimum_seed = statistics_find_run(table, metric, statistic->minimum);
-        statistic->maximum_seed = statistics_find_run(table, metric, statistic->maximum);
-    }
+    reals_sort(values.at, count);
+    for (size_t i = 0; i < COUNT(shares); i++)
+        statistic->quantiles[i] = statistics_quantile(values.at, count, shares[i]);
+    statistic->minimum_seed = statistics_find_run(table, metric, statistic->minimum);
+    statistic->maximum_seed = statistics_find_run(table, metric, statistic->maximum);
     free(values.at);
     return STATUS_OK;
 }
@@ -495,28 +485,6 @@ void spectrum_accumulator_clear(SpectrumAccumulator *sums) {
 // order its error is the mean of (u_j - S v_j) / V, whose variance gives the interval by Student's
 // t. Under a Latin hypercube or a Sobol sequence the errors are smaller, and the interval is wide.
 
-// Results of one base sample for one input.
-typedef struct SobolSample {
-    double a, b, mixed;
-} SobolSample;
-
-static bool sobol_sample_get(const SobolRuns *runs, size_t number, size_t input,
-                             SobolSample *sample) {
-    const double *at = runs->values + number * (runs->inputs + 2) * runs->stride;
-    *sample = (SobolSample){at[0], at[runs->stride], at[(2 + input) * runs->stride]};
-    return isfinite(sample->a) && isfinite(sample->b) && isfinite(sample->mixed);
-}
-
-// Terms of the means: first, total and V.
-typedef struct SobolTerms {
-    double first, total, variance;
-} SobolTerms;
-
-static SobolTerms sobol_terms(const SobolSample *sample, double mean) {
-    const double a = sample->a - mean, b = sample->b - mean, change = sample->mixed - sample->a;
-    return (SobolTerms){b * change, change * change / 2, (a * a + b * b) / 2};
-}
-
 // clang-format off
 const Field sobol_index_fields[] = {
     FIELD_COUNT(SobolIndex, samples, NULL, AT_MIN(0), 0, "base samples whose runs all ended"),
@@ -528,36 +496,48 @@ const Field sobol_index_fields[] = {
 };
 // clang-format on
 
+// Terms of one base sample: of U of the first and of the total index, of V, and of m.
+enum { SOBOL_FIRST, SOBOL_TOTAL, SOBOL_VARIANCE, SOBOL_MEAN, SOBOL_TERMS };
+
+// False where a result is unknown.
+static bool sobol_terms(const SobolRuns *runs, size_t number, size_t input, double mean,
+                        double terms[SOBOL_TERMS]) {
+    const double *at = runs->values + number * (runs->inputs + 2) * runs->stride;
+    const double a = at[0], b = at[runs->stride], change = at[(2 + input) * runs->stride] - a;
+    terms[SOBOL_FIRST] = (b - mean) * change;
+    terms[SOBOL_TOTAL] = change * change / 2;
+    terms[SOBOL_VARIANCE] = ((a - mean) * (a - mean) + (b - mean) * (b - mean)) / 2;
+    terms[SOBOL_MEAN] = (a + b) / 2;
+    return isfinite(a) && isfinite(b) && isfinite(change);
+}
+
 Status sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *index) {
-    SobolSample sample;
-    SobolTerms means = {0, 0, 0};
-    double mean = 0, n = 0, first_squares = 0, total_squares = 0;
+    double terms[SOBOL_TERMS], means[SOBOL_TERMS] = {0}, squares[SOBOL_VARIANCE] = {0};
+    double mean = 0, n = 0;
+    double *const values[] = {&index->first, &index->total};
+    Reals *const intervals[] = {&index->first_interval_95, &index->total_interval_95};
     *index = (SobolIndex){.first = (double)NAN, .total = (double)NAN};
     for (size_t j = 0; j < runs->samples; j++)
-        if (sobol_sample_get(runs, j, input, &sample))
-            mean += ((sample.a + sample.b) / 2 - mean) / ++n;
+        if (sobol_terms(runs, j, input, 0, terms))
+            mean += (terms[SOBOL_MEAN] - mean) / ++n;
     index->samples = (uint64_t)n;
     for (size_t j = 0; j < runs->samples; j++)
-        if (sobol_sample_get(runs, j, input, &sample)) {
-            const SobolTerms terms = sobol_terms(&sample, mean);
-            means.first += terms.first / n;
-            means.total += terms.total / n;
-            means.variance += terms.variance / n;
-        }
-    if (n < 2 || !(means.variance > 0) || !isfinite(means.variance))
+        for (size_t k = 0; k < SOBOL_TERMS && sobol_terms(runs, j, input, mean, terms); k++)
+            means[k] += terms[k] / n;
+    const double variance = means[SOBOL_VARIANCE];
+    if (n < 2 || !(variance > 0) || !isfinite(variance))
         return STATUS_OK;
-    index->first = means.first / means.variance;
-    index->total = means.total / means.variance;
     for (size_t j = 0; j < runs->samples; j++)
-        if (sobol_sample_get(runs, j, input, &sample)) {
-            const SobolTerms terms = sobol_terms(&sample, mean);
-            first_squares += pow((terms.first - index->first * terms.variance) / means.variance, 2);
-            total_squares += pow((terms.total - index->total * terms.variance) / means.variance, 2);
-        }
+        for (size_t k = 0; k < COUNT(squares) && sobol_terms(runs, j, input, mean, terms); k++)
+            squares[k] +=
+                pow((terms[k] - means[k] / variance * terms[SOBOL_VARIANCE]) / variance, 2);
     const double t =
         student_t_quantile(STATISTICS_CONFIDENCE, (size_t)index->samples - 1) / sqrt(n * (n - 1));
-    TRY(study_copy_interval(index->first, t * sqrt(first_squares), &index->first_interval_95));
-    return study_copy_interval(index->total, t * sqrt(total_squares), &index->total_interval_95);
+    for (size_t k = 0; k < COUNT(squares); k++) {
+        *values[k] = means[k] / variance;
+        TRY(study_copy_interval(*values[k], t * sqrt(squares[k]), intervals[k]));
+    }
+    return STATUS_OK;
 }
 
 // The lognormal fit. With x = ln of a bound and z = alpha x - gamma, alpha = 1 / beta and gamma =

@@ -92,7 +92,12 @@ typedef struct RunStatistic {
     double value; // of the study's own scene
     double mean, standard_deviation, standard_error;
     double low, high; // of the mean, by Student's t
-    double minimum, q05, q16, q25, median, q75, q84, q95, maximum;
+    union {
+        struct {
+            double minimum, q05, q16, q25, median, q75, q84, q95, maximum;
+        };
+        double quantiles[9];
+    };
     uint64_t minimum_seed, maximum_seed; // numbers of the runs; the first of equal ones
 } RunStatistic;
 
