@@ -732,15 +732,12 @@ static void calibrate_make_windows(CalibrateWork *work) {
 
 // The points of the first screen: a Sobol sequence, and the middle as the first.
 static Status calibrate_place_starts(CalibrateWork *work) {
-    Sampling sampling;
-    TRY(sampling_make(SAMPLING_SOBOL, work->study->search_seed, work->start_count, work->variables,
-                      &sampling));
+    const Sampling sampling = {SAMPLING_SOBOL, work->study->search_seed, work->start_count};
     for (size_t k = 0; k < work->start_count; k++) {
         work->starts[k].number = k;
         for (size_t i = 0; i < work->variables; i++)
             work->starts[k].fit.at[i] = k == 0 ? 0.5 : sampling_coordinate(&sampling, k, i);
     }
-    sampling_clear(&sampling);
     return STATUS_OK;
 }
 

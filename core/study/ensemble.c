@@ -354,8 +354,10 @@ static Status ensemble_work_make(EnsembleWork *work, const EnsembleStudy *study,
     work->each = ensemble_sample_runs(study, simulation);
     work->work.members = (size_t)study->runs * work->each;
     TRY(ensemble_base(study, simulation, &work->base));
-    return input_model_make(&study->inputs, &work->base, study->sampling, study->first_seed,
-                            (size_t)study->runs, study->sobol_indices ? 2 : 1, &work->model);
+    work->model =
+        input_model_make(&study->inputs, &work->base,
+                         (Sampling){study->sampling, study->first_seed, (size_t)study->runs});
+    return STATUS_OK;
 }
 
 static void ensemble_free(void *of) {
@@ -363,7 +365,6 @@ static void ensemble_free(void *of) {
     spectrum_accumulator_clear(&work->sums);
     spectrum_accumulator_clear(&work->history);
     simulation_clear(&work->base);
-    input_model_clear(&work->model);
     free(work->values);
 }
 

@@ -15,7 +15,6 @@
 #include "core/study/inputs.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/base/json_pointer.h"
@@ -93,33 +92,24 @@ static uint32_t sampling_sobol_word(uint64_t row, size_t dimension) {
     return word;
 }
 
-// Fisher and Yates. A word of 32 bits favours no stratum by more than rows / 2^32.
-static void sampling_shuffle(uint64_t seed, uint64_t stream, size_t count, uint32_t *strata) {
-    uint32_t words[4];
-    for (size_t i = 0; i < count; i++) {
-        if (i % 4 == 0)
-            sampling_words(seed, stream, i / 4, words);
-        const size_t k = (size_t)((uint64_t)words[i % 4] * (i + 1) >> 32);
-        strata[i] = strata[k];
-        strata[k] = (uint32_t)i;
-    }
-}
-
-Status sampling_make(int method, uint64_t seed, size_t rows, size_t dimensions,
-                     Sampling *sampling) {
-    *sampling = (Sampling){.method = method, .seed = seed, .rows = rows};
-    if (method != SAMPLING_LATIN_HYPERCUBE)
-        return STATUS_OK;
-    sampling->strata = calloc(rows * dimensions + 1, sizeof *sampling->strata);
-    TRY(status_made(sampling->strata != NULL));
-    for (size_t i = 0; i < dimensions; i++)
-        sampling_shuffle(seed, STREAM_STRATA + i, rows, sampling->strata + i * rows);
-    return STATUS_OK;
-}
-
-void sampling_clear(Sampling *sampling) {
-    free(sampling->strata);
-    *sampling = (Sampling){0};
+// The stratum of a row: a permutation of the numbers of some bits by rounds of Feistel (Luby and
+// Rackoff, SIAM J. Comput. 17, 373, 1988), repeated until it is one of the rows.
+static size_t sampling_stratum(const Sampling *sampling, size_t row, size_t dimension) {
+    enum { ROUNDS = 4 };
+    unsigned half = 1;
+    while (sampling->rows > (size_t)1 << 2 * half)
+        half++;
+    const size_t mask = ((size_t)1 << half) - 1;
+    do {
+        for (uint64_t round = 0; round < ROUNDS; round++) {
+            uint32_t words[4];
+            const size_t right = row & mask;
+            sampling_words(sampling->seed, STREAM_STRATA + dimension, right * ROUNDS + round,
+                           words);
+            row = right << half | ((row >> half) ^ (words[0] & mask));
+        }
+    } while (row >= sampling->rows);
+    return row;
 }
 
 double sampling_coordinate(const Sampling *sampling, size_t row, size_t dimension) {
@@ -131,8 +121,8 @@ double sampling_coordinate(const Sampling *sampling, size_t row, size_t dimensio
     const double within = sampling_uniform(sampling->seed, STREAM_POINTS + dimension, row);
     if (sampling->method != SAMPLING_LATIN_HYPERCUBE)
         return within;
-    const double place = ((double)sampling->strata[dimension * sampling->rows + row] + within) /
-                         (double)sampling->rows;
+    const double place =
+        ((double)sampling_stratum(sampling, row, dimension) + within) / (double)sampling->rows;
     return place == 0.5 ? 0.5 - 0x1p-53 : place;
 }
 
@@ -356,27 +346,23 @@ static void input_number_limit(InputNumber *number, const Simulation *simulation
     }
 }
 
-Status input_model_make(const UncertainInputs *inputs, const Simulation *simulation, int method,
-                        uint64_t seed, size_t rows, size_t tables, InputModel *model) {
-    *model = (InputModel){.count = 0};
+InputModel input_model_make(const UncertainInputs *inputs, const Simulation *simulation,
+                            Sampling sampling) {
+    InputModel model = {.sampling = sampling};
     for (size_t i = 0; i < inputs->count; i++) {
         const UncertainInput *input = &inputs->at[i];
         const bool is_material = input->distribution == INPUT_MATERIAL;
         if (!is_material)
-            model->axes[model->axis_count++] = input->axis;
+            model.axes[model.axis_count++] = input->axis;
         for (int parameter = is_material ? 0 : -1; parameter < (is_material ? 2 : 0); parameter++) {
             if (is_material && !(input->relative[parameter] > 0))
                 continue;
-            InputNumber *number = &model->numbers[model->count++];
+            InputNumber *number = &model.numbers[model.count++];
             *number = (InputNumber){.input = input, .index = i, .parameter = parameter};
             input_number_limit(number, simulation);
         }
     }
-    return sampling_make(method, seed, rows, tables * model->count, &model->sampling);
-}
-
-void input_model_clear(InputModel *model) {
-    sampling_clear(&model->sampling);
+    return model;
 }
 
 Status input_model_draw(const InputModel *model, size_t number, size_t row, size_t table,
@@ -461,11 +447,8 @@ Status uncertain_inputs_complete(UncertainInputs *inputs, const Simulation *simu
             status, uncertain_input_complete(&inputs->at[i], simulation,
                                              json_pointer_at(place_of_all, i).at, problem));
     TRY(status);
-    InputModel model;
-    status = input_model_make(inputs, simulation, SAMPLING_RANDOM, 1, 1, 1, &model);
-    if (status == STATUS_OK)
-        status = uncertain_inputs_check_medians(&model, simulation, limits, problem);
+    const InputModel model =
+        input_model_make(inputs, simulation, (Sampling){SAMPLING_RANDOM, 1, 1});
     *numbers = model.count;
-    input_model_clear(&model);
-    return status;
+    return uncertain_inputs_check_medians(&model, simulation, limits, problem);
 }

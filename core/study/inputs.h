@@ -20,18 +20,13 @@ typedef enum SamplingMethod {
 } SamplingMethod;
 extern const char *const sampling_names[]; // NULL-terminated
 
-// Points of one seed. Immutable, shared by threads.
+// Points of one seed: rows up to 2^32, dimensions up to 256, of a Sobol sequence up to
+// SAMPLING_SOBOL_DIMENSIONS.
 typedef struct Sampling {
     int method; // SamplingMethod
     uint64_t seed;
-    size_t rows;
-    uint32_t *strata; // of a Latin hypercube, dimension by dimension a permutation of the rows
+    size_t rows; // of a Latin hypercube
 } Sampling;
-
-// Rows up to 2^32, dimensions up to 256, of a Sobol sequence up to SAMPLING_SOBOL_DIMENSIONS.
-// Cleared by sampling_clear. STATUS_NO_MEMORY.
-Status sampling_make(int method, uint64_t seed, size_t rows, size_t dimensions, Sampling *sampling);
-void sampling_clear(Sampling *sampling);
 
 // A coordinate, within 0 and 1, never one of them and never 1/2.
 double sampling_coordinate(const Sampling *sampling, size_t row, size_t dimension);
@@ -92,11 +87,9 @@ typedef struct InputModel {
     Sampling sampling;
 } InputModel;
 
-// `tables` independent points per row: dimension d of table t is d + t * count. Borrows `inputs`.
-// Cleared by input_model_clear in any case. STATUS_NO_MEMORY.
-Status input_model_make(const UncertainInputs *inputs, const Simulation *simulation, int method,
-                        uint64_t seed, size_t rows, size_t tables, InputModel *model);
-void input_model_clear(InputModel *model);
+// Borrows `inputs`. Dimension d of a second, independent table of draws is d + count.
+InputModel input_model_make(const UncertainInputs *inputs, const Simulation *simulation,
+                            Sampling sampling);
 
 // Draws a number; *again counts values that were out of range. STATUS_INVALID if all were.
 Status input_model_draw(const InputModel *model, size_t number, size_t row, size_t table,

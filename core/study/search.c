@@ -114,14 +114,13 @@ Status search_new(const SearchSpace *space, Search **made) {
     if (model != NULL)
         model->ranks = calloc(candidates, sizeof *model->ranks);
     if (search->points == NULL || search->results == NULL || model == NULL ||
-        model->ranks == NULL ||
-        sampling_make(SAMPLING_SOBOL, space->seed, candidates, n, &model->filling) != STATUS_OK ||
-        sampling_make(SAMPLING_RANDOM, space->seed, candidates * search_tries(search), 2 + 2 * n,
-                      &model->drawing) != STATUS_OK) {
+        model->ranks == NULL) {
         search_free(search);
         *made = NULL;
         return STATUS_NO_MEMORY;
     }
+    model->filling = (Sampling){SAMPLING_SOBOL, space->seed, candidates};
+    model->drawing = (Sampling){SAMPLING_RANDOM, space->seed, candidates * search_tries(search)};
     for (size_t j = 0; j < n + 2; j++) {
         model->parameter[j] = search_range(search, j)->mean;
         model->step[j] = 0.7;
@@ -132,11 +131,8 @@ Status search_new(const SearchSpace *space, Search **made) {
 void search_free(Search *search) {
     if (search == NULL)
         return;
-    if (search->model != NULL) {
-        sampling_clear(&search->model->filling);
-        sampling_clear(&search->model->drawing);
+    if (search->model != NULL)
         free(search->model->ranks);
-    }
     free(search->model);
     free(search->points);
     free(search->results);

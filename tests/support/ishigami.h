@@ -44,8 +44,7 @@ static inline bool index_contains(const SobolIndex *index, double first, double 
 // The indices of all inputs of `f`; cleared by indices_clear.
 static inline void indices_estimate(double (*f)(const double *), int method, uint64_t seed,
                                     size_t samples, SobolIndex indices[INPUTS]) {
-    Sampling sampling;
-    assert_int_equal(sampling_make(method, seed, samples, 2 * INPUTS, &sampling), STATUS_OK);
+    const Sampling sampling = {method, seed, samples};
     double *values = calloc(samples * RUNS, sizeof *values);
     assert_non_null(values);
     for (size_t j = 0; j < samples; j++)
@@ -63,7 +62,6 @@ static inline void indices_estimate(double (*f)(const double *), int method, uin
         assert_int_equal(indices[i].samples, samples);
     }
     free(values);
-    sampling_clear(&sampling);
 }
 
 static inline void indices_clear(SobolIndex indices[INPUTS]) {

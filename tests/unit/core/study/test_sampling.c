@@ -8,16 +8,10 @@
 
 enum { ROWS = 64, DIMENSIONS = 32, MANY = 64 };
 
-static Sampling make(int method, uint64_t seed, size_t rows, size_t dimensions) {
-    Sampling sampling;
-    assert_int_equal(sampling_make(method, seed, rows, dimensions, &sampling), STATUS_OK);
-    return sampling;
-}
-
 TEST(every_stratum_of_a_latin_hypercube_has_one_point) {
     static const size_t counts[] = {2, 7, ROWS};
     for (size_t n = 0; n < COUNT(counts); n++) {
-        Sampling sampling = make(SAMPLING_LATIN_HYPERCUBE, 3, counts[n], MANY);
+        Sampling sampling = {SAMPLING_LATIN_HYPERCUBE, 3, counts[n]};
         for (size_t d = 0; d < MANY; d++) {
             bool is_taken[ROWS] = {false};
             for (size_t i = 0; i < counts[n]; i++) {
@@ -28,7 +22,6 @@ TEST(every_stratum_of_a_latin_hypercube_has_one_point) {
                 is_taken[stratum] = true;
             }
         }
-        sampling_clear(&sampling);
     }
 }
 
@@ -39,13 +32,12 @@ TEST(sobol_points_are_those_of_joe_and_kuo) {
         0.8125, 0.6875, 0.8125, 0.0625, 0.4375, 0.9375, 0.5625, 0.5625, 0.5625, 0.4375, 0.8125,
         0.9375, 0.0625, 0.8125, 0.1875, 0.5625, 0.1875, 0.6875, 0.5625, 0.9375, 0.5625, 0.0625,
         0.8125, 0.5625, 0.0625, 0.4375, 0.4375, 0.0625, 0.0625, 0.3125, 0.5625, 0.4375};
-    Sampling sampling = make(SAMPLING_SOBOL, 9, 1 << 20, DIMENSIONS);
+    Sampling sampling = {SAMPLING_SOBOL, 9, 1 << 20};
     for (size_t d = 0; d < DIMENSIONS; d++) {
         const uint32_t shift = (uint32_t)(sampling_coordinate(&sampling, 0, d) * 0x1p32);
         const uint32_t word = (uint32_t)(sampling_coordinate(&sampling, 11, d) * 0x1p32);
         assert_true((double)(word ^ shift) * 0x1p-32 == row11[d]);
     }
-    sampling_clear(&sampling);
 }
 
 // Each dimension of 2^k points has one in each of 2^k parts, also the 30th: the recurrence of the
@@ -53,7 +45,7 @@ TEST(sobol_points_are_those_of_joe_and_kuo) {
 TEST(sobol_points_are_one_in_each_part_of_every_dimension) {
     enum { POINTS = 1 << 12 };
     static bool is_taken[POINTS];
-    Sampling sampling = make(SAMPLING_SOBOL, 1, POINTS, DIMENSIONS);
+    Sampling sampling = {SAMPLING_SOBOL, 1, POINTS};
     for (size_t d = 0; d < DIMENSIONS; d++) {
         memset(is_taken, 0, sizeof is_taken);
         for (size_t i = 0; i < POINTS; i++) {
@@ -62,7 +54,6 @@ TEST(sobol_points_are_one_in_each_part_of_every_dimension) {
             is_taken[part] = true;
         }
     }
-    sampling_clear(&sampling);
 }
 
 // A smooth function's mean: sobol and latin_hypercube are nearer to it than independent points.
@@ -70,7 +61,7 @@ TEST(means_over_even_points_have_smaller_errors) {
     double error[3] = {0};
     for (int method = SAMPLING_RANDOM; method <= SAMPLING_SOBOL; method++)
         for (uint64_t seed = 1; seed <= 20; seed++) {
-            Sampling sampling = make(method, seed, 256, 4);
+            Sampling sampling = {method, seed, 256};
             double mean = 0;
             for (size_t i = 0; i < 256; i++) {
                 double value = 0;
@@ -79,7 +70,6 @@ TEST(means_over_even_points_have_smaller_errors) {
                 mean += value * value / 256;
             }
             error[method] += pow(mean - (4 + 1 / 3.0), 2);
-            sampling_clear(&sampling);
         }
     assert_true(error[SAMPLING_LATIN_HYPERCUBE] < error[SAMPLING_RANDOM] / 5);
     assert_true(error[SAMPLING_SOBOL] < error[SAMPLING_RANDOM] / 50);
@@ -87,8 +77,7 @@ TEST(means_over_even_points_have_smaller_errors) {
 
 TEST(points_depend_on_seed_row_and_dimension_alone) {
     for (int method = SAMPLING_RANDOM; method <= SAMPLING_SOBOL; method++) {
-        Sampling one = make(method, 5, ROWS, 8), same = make(method, 5, ROWS, 8),
-                 other = make(method, 6, ROWS, 8);
+        Sampling one = {method, 5, ROWS}, same = {method, 5, ROWS}, other = {method, 6, ROWS};
         size_t equal = 0;
         for (size_t i = ROWS; i-- > 0;)
             for (size_t d = 8; d-- > 0;) {
@@ -99,8 +88,5 @@ TEST(points_depend_on_seed_row_and_dimension_alone) {
                             sampling_draw_again(&one, i, d, 1));
             }
         assert_int_equal(equal, 0);
-        sampling_clear(&one);
-        sampling_clear(&same);
-        sampling_clear(&other);
     }
 }
