@@ -113,35 +113,31 @@ static Status fragility_complete_intensity(FragilityIntensity *intensity, Proble
 }
 
 static Status fragility_complete_levels(FragilityLevels *levels, Problem *problem) {
-    const char *place = "/study/levels";
-    const bool has_range =
-        !isnan(levels->from) || !isnan(levels->to) || levels->count != COUNT_ABSENT;
+    char place[] = "/study/levels";
     Reals *values = &levels->values;
-    if (values->count > 0 && has_range)
-        return problem_add(problem, STATUS_INVALID, place,
-                           "has values and a range: leave out values, or from, to and count");
+    const StudyAxis axis = {.pointer = place,
+                            .values = {NULL, values->count},
+                            .from = levels->from,
+                            .to = levels->to,
+                            .count = levels->count,
+                            .spacing = CHOICE_ABSENT};
+    TRY(study_axis_check(&axis, true, place, problem));
+    if (values->count == 0) {
+        if (!(axis.from < axis.to))
+            return problem_add(problem, STATUS_INVALID, place,
+                               "from must be below to, is %s m/s^2, to is %s m/s^2",
+                               real_text(axis.from).at, real_text(axis.to).at);
+        TRY(status_made(reals_allocate(values, (size_t)axis.count)));
+        for (size_t i = 0; i < values->count; i++)
+            values->at[i] = study_axis_value(&axis, i).number;
+        levels->from = levels->to = (double)NAN;
+        levels->count = COUNT_ABSENT;
+    }
     for (size_t i = 0; i < values->count; i++)
         if (!(values->at[i] > (i > 0 ? values->at[i - 1] : 0)))
             return problem_add_real(
                 problem, STATUS_INVALID, json_pointer_at(place, i).at, values->at[i], "m/s^2",
                 i > 0 ? "must be above the one before it: levels rise" : "must be above 0 m/s^2");
-    if (values->count > 0)
-        return STATUS_OK;
-    if (isnan(levels->from) || isnan(levels->to) || levels->count == COUNT_ABSENT)
-        return problem_add(problem, STATUS_INVALID, place,
-                           "needs a list of intensities, or a range of from, to and count");
-    if (!(levels->from < levels->to))
-        return problem_add(problem, STATUS_INVALID, place,
-                           "from must be below to, is %s m/s^2, to is %s m/s^2",
-                           real_text(levels->from).at, real_text(levels->to).at);
-    const size_t last = (size_t)levels->count - 1;
-    if (!reals_allocate(values, last + 1))
-        return STATUS_NO_MEMORY;
-    for (size_t i = 0; i <= last; i++)
-        values->at[i] = levels->from + (levels->to - levels->from) / (double)last * (double)i;
-    values->at[last] = levels->to;
-    levels->from = levels->to = (double)NAN;
-    levels->count = COUNT_ABSENT;
     return STATUS_OK;
 }
 
@@ -209,31 +205,27 @@ static Status fragility_base(const FragilityStudy *study, const Simulation *simu
 static Status fragility_complete(void *request, const Simulation *simulation,
                                  const SimulationLimits *limits, Problem *problem) {
     FragilityStudy *study = request;
+    (void)limits;
     const Status faults[] = {fragility_complete_intensity(&study->intensity, problem),
                              fragility_complete_levels(&study->levels, problem),
                              fragility_check_limits(study, simulation, problem),
                              fragility_check_records(study, problem)};
     TRY(status_first(faults, COUNT(faults)));
-    TRY(fragility_check_runs(study, problem));
-    Simulation base = {0}, scene = {0};
-    Status status = fragility_base(study, simulation, &base);
-    if (status == STATUS_OK)
-        status = fragility_make_scene(&base, &study->records.at[0], 1, limits, &scene, problem);
-    simulation_clear(&base);
-    simulation_clear(&scene);
-    return status;
+    return fragility_check_runs(study, problem);
 }
 
-// What makes a scene of any record.
-typedef struct FragilityScenes {
+typedef struct FragilityWork {
+    StudyWork work;
     const FragilityStudy *study;
-    const Simulation *base;
-} FragilityScenes;
+    Fragility *answer;
+    size_t levels;
+    Simulation base;
+} FragilityWork;
 
 static Status fragility_scene_of(const void *of, size_t record, const SimulationLimits *limits,
                                  Simulation *scene) {
-    const FragilityScenes *scenes = of;
-    return fragility_make_scene(scenes->base, &scenes->study->records.at[record], 1, limits, scene,
+    const FragilityWork *work = of;
+    return fragility_make_scene(&work->base, &work->study->records.at[record], 1, limits, scene,
                                 NULL);
 }
 
@@ -241,13 +233,13 @@ static Status fragility_scene_of(const void *of, size_t record, const Simulation
 static Status fragility_cost(const void *request, const Simulation *simulation,
                              const SimulationLimits *limits, double *steps) {
     const FragilityStudy *study = request;
-    Simulation base = {0};
+    FragilityWork work = {.study = study};
     *steps = 0;
-    Status status = fragility_base(study, simulation, &base);
+    Status status = fragility_base(study, simulation, &work.base);
     if (status == STATUS_OK)
-        status = study_sample_cost(fragility_scene_of, &(FragilityScenes){study, &base},
-                                   study->records.count, COST_RECORDS, limits, steps);
-    simulation_clear(&base);
+        status = study_sample_cost(fragility_scene_of, &work, study->records.count, COST_RECORDS,
+                                   limits, steps);
+    simulation_clear(&work.base);
     *steps *= (double)study->levels.values.count;
     for (size_t i = 0; i < study->records.count && !isnan(study->intensity.period); i++) {
         const NamedRecord *record = fragility_record(study, i);
@@ -268,14 +260,6 @@ static void fragility_references(void *request, StudyReferences *references) {
 }
 
 // --- the work ---
-
-typedef struct FragilityWork {
-    StudyWork work;
-    const FragilityStudy *study;
-    Fragility *answer;
-    size_t levels;
-    Simulation base;
-} FragilityWork;
 
 // Measures the records.
 static Status fragility_measure(FragilityWork *work, const StudyTools *tools, Problem *problem) {

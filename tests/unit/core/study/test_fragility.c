@@ -197,7 +197,7 @@ TEST(senseless_requests_are_refused_at_their_place) {
     refuse(&request, "/study/limits", "is required");
     add_limit(study, "peak_displacement", 0.02);
     study->levels.from = 1;
-    refuse(&request, "/study/levels", "needs a list of intensities, or a range");
+    refuse(&request, "/study/levels", "needs values, or a range");
     study->levels.to = 1;
     study->levels.count = 4;
     refuse(&request, "/study/levels", "from must be below to");
