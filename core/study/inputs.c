@@ -194,67 +194,55 @@ static Status uncertain_input_check_parameters(const UncertainInput *input, cons
     return status;
 }
 
-// Index of the given buffer that a pointer such as /dampers/0/left_buffer designates, among the
-// three of each damper; SIZE_MAX: none.
-static size_t input_buffer_index(const Simulation *simulation, const char *pointer) {
-    const Dampers *dampers = &simulation->scene.dampers;
+// Number of the given buffer that a pointer such as /dampers/0/left_buffer designates; SIZE_MAX:
+// none.
+static size_t input_buffer(const StudyAxis *axis, size_t index, const Dampers *dampers) {
     for (size_t i = 0; i < SENSITIVITY_BUFFERS * dampers->count; i++) {
-        const size_t damper = i / SENSITIVITY_BUFFERS, place = i % SENSITIVITY_BUFFERS;
-        const JsonPointer own = json_pointer_of(json_pointer_at("/dampers", damper).at,
-                                                sensitivity_buffer_names[place]);
-        if (strcmp(own.at, pointer) == 0 &&
-            buffer_is_given(perturbation_buffer(&dampers->at[damper], place)))
+        const JsonPointer damper = json_pointer_at("/dampers", i / SENSITIVITY_BUFFERS),
+                          own = json_pointer_of(damper.at,
+                                                sensitivity_buffer_names[i % SENSITIVITY_BUFFERS]);
+        if (strcmp(own.at, study_axis_pointer(axis, index)) == 0 &&
+            buffer_is_given(perturbation_buffer(dampers, i)))
             return i;
     }
     return SIZE_MAX;
 }
 
-static const Buffer *input_buffer(const Simulation *simulation, const UncertainInput *input,
-                                  size_t index) {
-    const size_t at = input_buffer_index(simulation, study_axis_pointer(&input->axis, index));
-    return at != SIZE_MAX
-               ? perturbation_buffer(&simulation->scene.dampers.at[at / SENSITIVITY_BUFFERS],
-                                     at % SENSITIVITY_BUFFERS)
-               : NULL;
-}
-
-// Of an input of distribution material.
-static Status uncertain_input_check_buffer(const UncertainInput *input, size_t index,
+static Status uncertain_input_check_member(const UncertainInput *input, size_t index,
                                            const Simulation *simulation, const char *place,
                                            Problem *problem) {
-    const Buffer *buffer = input_buffer(simulation, input, index),
-                 *first = input_buffer(simulation, input, 0);
-    if (buffer == NULL)
+    const Dampers *dampers = &simulation->scene.dampers;
+    const StudyAxis *axis = &input->axis;
+    const size_t buffer = input_buffer(axis, index, dampers),
+                 first = input_buffer(axis, 0, dampers);
+    const bool is_material = input->distribution == INPUT_MATERIAL;
+    char why[JSON_POINTER_MESSAGE_MAX];
+    bool is_tag;
+    const Field *field = json_pointer_find(simulation_fields, simulation,
+                                           study_axis_pointer(axis, index), &is_tag, why);
+    if (is_material && buffer == SIZE_MAX)
         return problem_add(problem, STATUS_INVALID, place,
                            "must designate a given buffer for distribution material: "
                            "/dampers/0/buffer where both stops have the same");
-    if (first != NULL && !text_same(first->material, buffer->material))
+    if (field == NULL)
+        return problem_add(problem, STATUS_INVALID, place, "%s", why);
+    if (!is_material && !study_field_is_real(field, is_tag))
+        return problem_add(
+            problem, STATUS_INVALID, place, "must designate a real number%s",
+            field->kind == FIELD_KIND_ITEM ? "; a buffer can have the distribution material" : "");
+    if (is_material && first != SIZE_MAX &&
+        !text_same(perturbation_buffer(dampers, first)->material,
+                   perturbation_buffer(dampers, buffer)->material))
         return problem_add(problem, STATUS_INVALID, place,
                            "must have the material of the first one: give an input each");
     return STATUS_OK;
 }
 
-// Of other distributions.
-static Status uncertain_input_check_number(const UncertainInput *input, size_t index,
-                                           const Simulation *simulation, const char *place,
-                                           Problem *problem) {
-    char why[JSON_POINTER_MESSAGE_MAX];
-    bool is_tag;
-    const Field *field = json_pointer_find(simulation_fields, simulation,
-                                           study_axis_pointer(&input->axis, index), &is_tag, why);
-    if (field == NULL)
-        return problem_add(problem, STATUS_INVALID, place, "%s", why);
-    if (study_field_is_real(field, is_tag))
-        return STATUS_OK;
-    return problem_add(
-        problem, STATUS_INVALID, place, "must designate a real number%s",
-        field->kind == FIELD_KIND_ITEM ? "; a buffer can have the distribution material" : "");
-}
-
 // Fills in the recorded deviations of a material; 0: exact, or not a number of this scene.
 static Status uncertain_input_fill(UncertainInput *input, const Simulation *simulation,
                                    const char *place, Problem *problem) {
-    const Buffer *buffer = input_buffer(simulation, input, 0);
+    const Dampers *dampers = &simulation->scene.dampers;
+    const Buffer *buffer = perturbation_buffer(dampers, input_buffer(&input->axis, 0, dampers));
     for (int i = SENSITIVITY_RESTITUTION; i <= SENSITIVITY_CONTACT_TIME; i++) {
         const char *refused = perturbation_refuse(simulation, i),
                    *name = input_parameters[INPUT_MATERIAL][i];
@@ -285,9 +273,7 @@ static Status uncertain_input_complete(UncertainInput *input, const Simulation *
     for (size_t i = 0; i < study_axis_pointer_count(&input->axis); i++) {
         const JsonPointer own = study_axis_place(&input->axis, place, i);
         status = study_first_failure(
-            status, input->distribution == INPUT_MATERIAL
-                        ? uncertain_input_check_buffer(input, i, simulation, own.at, problem)
-                        : uncertain_input_check_number(input, i, simulation, own.at, problem));
+            status, uncertain_input_check_member(input, i, simulation, own.at, problem));
     }
     return status == STATUS_OK && input->distribution == INPUT_MATERIAL
                ? uncertain_input_fill(input, simulation, place, problem)
@@ -336,10 +322,9 @@ static void input_number_limit(InputNumber *number, const Simulation *simulation
                 fmax(number->min,
                      range->is_open_below ? nextafter(range->min, (double)INFINITY) : range->min);
         } else if (number->parameter == SENSITIVITY_RESTITUTION) {
-            const size_t at = input_buffer_index(simulation, pointer);
-            const double max =
-                perturbation_buffer_max(&simulation->scene.dampers.at[at / SENSITIVITY_BUFFERS],
-                                        at % SENSITIVITY_BUFFERS, SENSITIVITY_RESTITUTION);
+            const Dampers *dampers = &simulation->scene.dampers;
+            const double max = perturbation_buffer_max(dampers, input_buffer(axis, i, dampers),
+                                                       SENSITIVITY_RESTITUTION);
             if (max > 0)
                 number->max = fmin(number->max, 1 / max);
         }
@@ -381,17 +366,14 @@ Status input_model_draw(const InputModel *model, size_t number, size_t row, size
 }
 
 // Factors are those of the base's numbers, values are set after them.
-static void input_model_scale(const InputModel *model, const double *values, const Simulation *base,
-                              Simulation *copy) {
+static void input_model_scale(const InputModel *model, const double *values, const Dampers *base,
+                              Dampers *copy) {
     for (size_t i = 0; i < model->count; i++) {
         const InputNumber *number = &model->numbers[i];
         const StudyAxis *axis = &number->input->axis;
-        for (size_t k = 0; k < study_axis_pointer_count(axis) && number->parameter >= 0; k++) {
-            const size_t at = input_buffer_index(base, study_axis_pointer(axis, k)),
-                         damper = at / SENSITIVITY_BUFFERS;
-            perturbation_scale(&base->scene.dampers.at[damper], at % SENSITIVITY_BUFFERS,
-                               number->parameter, values[i], &copy->scene.dampers.at[damper]);
-        }
+        for (size_t k = 0; k < study_axis_pointer_count(axis) && number->parameter >= 0; k++)
+            perturbation_scale(base, input_buffer(axis, k, base), number->parameter, values[i],
+                               copy);
     }
 }
 
@@ -403,7 +385,7 @@ Status input_model_scene(const InputModel *model, const double *values, const Si
     *target = (Simulation){0};
     if (fields_copy(simulation_fields, base, &copy) != STATUS_OK)
         return study_result(STATUS_NO_MEMORY, problem);
-    input_model_scale(model, values, base, &copy);
+    input_model_scale(model, values, &base->scene.dampers, &copy.scene.dampers);
     for (size_t i = 0; i < model->count; i++)
         if (model->numbers[i].parameter < 0)
             set[count++] = (StudyValue){NULL, values[i]};

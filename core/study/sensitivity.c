@@ -22,15 +22,15 @@ enum { BUFFERS = SENSITIVITY_BUFFERS, DRAWS_MAX = 64, STREAM = 0x53454e53 };
 const char *const sensitivity_parameter_names[] = {
     "restitution", "contact_time", "stiffness", "damping", "mass", "clearance", NULL};
 
-Buffer *perturbation_buffer(const Damper *damper, size_t index) {
-    static const size_t offsets[BUFFERS] = {offsetof(Damper, buffer), offsetof(Damper, left_buffer),
-                                            offsetof(Damper, right_buffer)};
-    return (Buffer *)(void *)((char *)damper + offsets[index]);
+Buffer *perturbation_buffer(const Dampers *dampers, size_t buffer) {
+    Damper *damper = &dampers->at[buffer / BUFFERS];
+    Buffer *const buffers[BUFFERS] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
+    return buffers[buffer % BUFFERS];
 }
 
 // The numbers of a parameter in one buffer and the rows of its table, or in its damper, from 0;
 // NULL beyond the last.
-static double *perturbation_number(const Damper *damper, size_t buffer, int parameter,
+static double *perturbation_number(const Dampers *dampers, size_t buffer, int parameter,
                                    size_t index) {
     static const size_t offsets[] = {
         [SENSITIVITY_RESTITUTION] = offsetof(Buffer, restitution),
@@ -40,9 +40,10 @@ static double *perturbation_number(const Damper *damper, size_t buffer, int para
         [SENSITIVITY_MASS] = offsetof(Damper, mass),
         [SENSITIVITY_CLEARANCE] = offsetof(Damper, clearance),
     };
-    Buffer *of = perturbation_buffer(damper, buffer);
+    Buffer *of = perturbation_buffer(dampers, buffer);
+    Damper *damper = &dampers->at[buffer / BUFFERS];
     const bool is_dampers = parameter >= SENSITIVITY_MASS;
-    if (index == 0 && !(is_dampers && buffer > 0))
+    if (index == 0 && !(is_dampers && buffer % BUFFERS > 0))
         return (double *)(void *)((is_dampers ? (char *)damper : (char *)of) + offsets[parameter]);
     if (parameter > SENSITIVITY_CONTACT_TIME || index > of->table.count)
         return NULL;
@@ -50,10 +51,10 @@ static double *perturbation_number(const Damper *damper, size_t buffer, int para
     return parameter == SENSITIVITY_RESTITUTION ? &row->restitution : &row->contact_time;
 }
 
-double perturbation_buffer_max(const Damper *damper, size_t buffer, int parameter) {
+double perturbation_buffer_max(const Dampers *dampers, size_t buffer, int parameter) {
     double max = (double)NAN;
     const double *number;
-    for (size_t i = 0; (number = perturbation_number(damper, buffer, parameter, i)) != NULL; i++)
+    for (size_t i = 0; (number = perturbation_number(dampers, buffer, parameter, i)) != NULL; i++)
         max = fmax(max, *number);
     return max;
 }
@@ -63,7 +64,7 @@ static double perturbation_max(const Simulation *simulation, int parameter) {
     const Dampers *dampers = &simulation->scene.dampers;
     double max = (double)NAN;
     for (size_t i = 0; i < BUFFERS * dampers->count; i++)
-        max = fmax(max, perturbation_buffer_max(&dampers->at[i / BUFFERS], i % BUFFERS, parameter));
+        max = fmax(max, perturbation_buffer_max(dampers, i, parameter));
     return max;
 }
 
@@ -90,8 +91,8 @@ double perturbation_max_step(const Simulation *simulation, int parameter, double
                : step;
 }
 
-void perturbation_scale(const Damper *from, size_t buffer, int parameter, double factor,
-                        Damper *to) {
+void perturbation_scale(const Dampers *from, size_t buffer, int parameter, double factor,
+                        Dampers *to) {
     const double max = parameter == SENSITIVITY_RESTITUTION ? 1 : (double)INFINITY;
     const double *number;
     for (size_t i = 0; (number = perturbation_number(from, buffer, parameter, i)) != NULL; i++)
@@ -103,8 +104,7 @@ void perturbation_apply(const Simulation *simulation, int parameter, double fact
                         Simulation *target) {
     const Dampers *dampers = &simulation->scene.dampers;
     for (size_t i = 0; i < BUFFERS * dampers->count; i++)
-        perturbation_scale(&dampers->at[i / BUFFERS], i % BUFFERS, parameter, factor,
-                           &target->scene.dampers.at[i / BUFFERS]);
+        perturbation_scale(dampers, i, parameter, factor, &target->scene.dampers);
 }
 
 double perturbation_factor(double normal, double s) {
@@ -134,21 +134,19 @@ Status perturbation_draw(const InputUncertainty *uncertainty, uint64_t seed,
     const Dampers *dampers = &simulation->scene.dampers;
     size_t drawn = 0;
     for (size_t i = 0; i < BUFFERS * dampers->count; i++) {
-        const size_t damper = i / BUFFERS, k = i % BUFFERS;
-        const Damper *from = &dampers->at[damper];
         double deviation[2], factor[2];
-        if (!buffer_is_given(perturbation_buffer(from, k)))
+        if (!buffer_is_given(perturbation_buffer(dampers, i)))
             continue;
         for (int parameter = 0; parameter < 2; parameter++)
-            deviation[parameter] =
-                uncertainty_find(uncertainty, damper, (SensitivityBuffer)k, parameter);
+            deviation[parameter] = uncertainty_find(uncertainty, i / BUFFERS,
+                                                    (SensitivityBuffer)(i % BUFFERS), parameter);
         perturbation_draw_factors(seed, run, drawn++,
-                                  perturbation_buffer_max(from, k, SENSITIVITY_RESTITUTION),
+                                  perturbation_buffer_max(dampers, i, SENSITIVITY_RESTITUTION),
                                   deviation, factor);
         for (int parameter = 0; parameter < 2; parameter++)
             if (deviation[parameter] > 0)
-                perturbation_scale(from, k, parameter, factor[parameter],
-                                   &target->scene.dampers.at[damper]);
+                perturbation_scale(dampers, i, parameter, factor[parameter],
+                                   &target->scene.dampers);
         TRY(study_add_real(factor[0], restitution));
         TRY(study_add_real(factor[1], contact_time));
     }
@@ -187,7 +185,7 @@ static Status uncertainty_fill_recorded(InputUncertainty *uncertainty,
                                         const Simulation *simulation) {
     const Dampers *dampers = &simulation->scene.dampers;
     for (size_t i = 0; i < BUFFERS * dampers->count; i++) {
-        const Buffer *buffer = perturbation_buffer(&dampers->at[i / BUFFERS], i % BUFFERS);
+        const Buffer *buffer = perturbation_buffer(dampers, i);
         double recorded[2];
         for (int parameter = 0; parameter < 2; parameter++) {
             recorded[parameter] = uncertainty_recorded(buffer, parameter);
@@ -258,7 +256,7 @@ static Status uncertainty_check(const InputUncertainty *uncertainty, const Simul
     if (deviation->damper > dampers->count)
         return json_pointer_fault(problem, place, "damper", "must be the number of a damper");
     const Buffer *buffer =
-        perturbation_buffer(&dampers->at[deviation->damper - 1], (size_t)deviation->buffer);
+        perturbation_buffer(dampers, (deviation->damper - 1) * BUFFERS + (size_t)deviation->buffer);
     if (!buffer_is_given(buffer))
         return json_pointer_fault(
             problem, place, "buffer",

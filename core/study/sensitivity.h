@@ -73,15 +73,15 @@ double perturbation_max_step(const Simulation *simulation, int parameter, double
 void perturbation_apply(const Simulation *simulation, int parameter, double factor,
                         Simulation *target);
 
-// One of a damper's buffers, by SensitivityBuffer.
-Buffer *perturbation_buffer(const Damper *damper, size_t buffer);
+// One of the buffers of all dampers, numbered by SENSITIVITY_BUFFERS * damper + SensitivityBuffer.
+Buffer *perturbation_buffer(const Dampers *dampers, size_t buffer);
 
 // The largest number of a parameter in a buffer and the rows of its table; NAN: none.
-double perturbation_buffer_max(const Damper *damper, size_t buffer, int parameter);
+double perturbation_buffer_max(const Dampers *dampers, size_t buffer, int parameter);
 
 // Sets all of them in `to` to `factor` times those of `from`; a restitution is at most 1.
-void perturbation_scale(const Damper *from, size_t buffer, int parameter, double factor,
-                        Damper *to);
+void perturbation_scale(const Dampers *from, size_t buffer, int parameter, double factor,
+                        Dampers *to);
 
 // Log-normal of mean 1 and relative deviation `s`, from a standard normal number.
 double perturbation_factor(double normal, double s);
