@@ -9,9 +9,10 @@ const char *const impact_kind_names[] = {
     [IMPACT_IMPACT] = "impact", [IMPACT_RESTING] = "resting", NULL};
 
 const char *const metric_names[] = {
-    "displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement", NULL,
+    "displacement",     "mean_acceleration", "peak_force",      "impacts", "psd",
+    "rms_displacement", "peak_storey_drift", "peak_base_shear", NULL,
 };
-const char *const metric_units[] = {"", "", "", "", " dB", "", NULL};
+const char *const metric_units[] = {"", "", "", "", " dB", "", "", "", NULL};
 
 // clang-format off
 const Field impact_fields[] = {

@@ -21,7 +21,7 @@ static const double ROUNDINGS = 1e-14; // error that a run without growth estima
 
 // Upper bounds of the metric's relative error over that of the displacement. A slightly late impact
 // falls into another sample interval. For the rms see target_rms_gain().
-static const double gains[METRIC_COUNT] = {1, 200, 30, 10, 5000, 1};
+static const double gains[METRIC_COUNT] = {1, 200, 30, 10, 5000, 1, 30, 200};
 // The same for lines of a spectrum over the rms of the motion.
 static const double spectrum_gain = 10;
 
@@ -71,7 +71,8 @@ static double target_modes_error(const AccuracyTarget *target, uint64_t kept) {
                                                               : error->rms_displacement;
     case METRIC_MEAN_ACCELERATION:
         return error->mean_acceleration;
-    case METRIC_PSD: // of any channel, in each of its lines
+    case METRIC_PEAK_BASE_SHEAR: // a sum of accelerations
+    case METRIC_PSD:             // of any channel, in each of its lines
         return fmin(fmax(error->mean_acceleration, error->displacement) * spectrum_gain, 1);
     default:
         return fmin(gains[metric] * error->displacement, 1);

@@ -15,6 +15,8 @@ const Field error_fields[] = {
     FIELD_REAL(Errors, impacts, NULL, ANY, OPTIONAL, "difference of the numbers of impacts within the horizon"),
     FIELD_REAL(Errors, psd, "dB", ANY, OPTIONAL, "rms distance of the spectra over the band that holds 99.9 % of the reference's power, of the channel with the largest distance; unknown if that band is not covered"),
     FIELD_REAL(Errors, rms_displacement, NULL, ANY, OPTIONAL, "relative difference of the rms displacement of the whole run"),
+    FIELD_REAL(Errors, peak_storey_drift, NULL, ANY, OPTIONAL, "relative difference of the largest storey drift of the whole run; unknown where the structure is no frame"),
+    FIELD_REAL(Errors, peak_base_shear, NULL, ANY, OPTIONAL, "likewise of the largest base shear"),
     FIELD_END
 };
 
@@ -31,9 +33,14 @@ const Field reference_summary_fields[] = {
 // clang-format on
 
 double error_metrics_by(const Errors *errors, int metric) {
-    const double all[METRIC_COUNT] = {errors->displacement, errors->mean_acceleration,
-                                      errors->peak_force,   errors->impacts,
-                                      errors->psd,          errors->rms_displacement};
+    const double all[METRIC_COUNT] = {errors->displacement,
+                                      errors->mean_acceleration,
+                                      errors->peak_force,
+                                      errors->impacts,
+                                      errors->psd,
+                                      errors->rms_displacement,
+                                      errors->peak_storey_drift,
+                                      errors->peak_base_shear};
     return all[metric];
 }
 
@@ -180,7 +187,9 @@ Errors error_metrics_measure(const Outcome *reference, const Outcome *point, boo
                      .peak_force = (double)NAN,
                      .impacts = (double)NAN,
                      .psd = errors_psd(&reference->spectrum, &point->spectrum),
-                     .rms_displacement = (double)NAN};
+                     .rms_displacement = (double)NAN,
+                     .peak_storey_drift = (double)NAN,
+                     .peak_base_shear = (double)NAN};
     if (!has_motion)
         return errors;
     const size_t count = errors_samples(reference);
@@ -197,6 +206,11 @@ Errors error_metrics_measure(const Outcome *reference, const Outcome *point, boo
     if (outcome_has_force(point) && outcome_has_force(reference) && !isnan(a.peak))
         errors.peak_force = errors_ratio(fabs(fmax(b.peak, 0) - a.peak), a.peak);
     errors.rms_displacement = errors_ratio(fabs(point->summary.rms_displacement - rms), rms);
+    const Summary *is = &point->summary, *should = &reference->summary;
+    errors.peak_storey_drift = errors_ratio(fabs(is->peak_storey_drift - should->peak_storey_drift),
+                                            should->peak_storey_drift);
+    errors.peak_base_shear =
+        errors_ratio(fabs(is->peak_base_shear - should->peak_base_shear), should->peak_base_shear);
     return errors;
 }
 

@@ -13,7 +13,8 @@ typedef struct Errors {
     double peak_force;        // relative difference of the largest force
     double impacts;           // difference of the numbers
     double psd;               // rms distance [dB]
-    double rms_displacement;  // relative difference
+    double rms_displacement;  // relative difference, as of the next
+    double peak_storey_drift, peak_base_shear;
 } Errors;
 extern const Field error_fields[];
 

@@ -146,7 +146,11 @@ static Drawn scene_draw(uint64_t number) {
 static const char *metric_draw(const Drawn *drawn) {
     static const char *const metrics[] = {"displacement", "displacement", "rms_displacement",
                                           "mean_acceleration"};
-    return drawn->kind == 2 ? "psd" : metrics[below(COUNT(metrics))];
+    static const char *const of_frames[] = {"displacement", "rms_displacement", "mean_acceleration",
+                                            "peak_storey_drift", "peak_base_shear"};
+    return drawn->kind == 2   ? "psd"
+           : drawn->kind == 1 ? of_frames[below(COUNT(of_frames))]
+                              : metrics[below(COUNT(metrics))];
 }
 
 static const SimulationLimits limits = {.samples = 1 << 22, .impacts = 1000000, .steps = 2e7};
