@@ -236,6 +236,8 @@ TEST(what_cannot_be_answered_is_refused) {
 TEST(the_usual_error_is_the_metrics) {
     static const double usual[] = {1e-3, 1e-2, 1e-2, 0, 0.1, 1e-3, 1e-2, 1e-2};
     for (int metric = 0; metric < METRIC_COUNT; metric++) {
+        if (metric == METRIC_PEAK_STOREY_DRIFT)
+            continue; // of frames
         StudyRequest inquiry = study_request_make(0.025, 2, 3);
         study_of(&inquiry)->metric = metric;
         complete(&inquiry);
