@@ -5,7 +5,7 @@
 //
 //     screen      many points, of which the best become starts
 //     fit         each start by Levenberg and Marquardt's method, all side by side
-//     covariance  derivatives at the best point, after the last window
+//     covariance  derivatives at the best point, on both sides of it, after the last window
 //     explore     points around it, near and far; better ones are fitted
 //
 // A window whose valleys are too narrow to be found with certainty is left: the one before is the
@@ -29,14 +29,12 @@
 
 enum {
     VARIABLES = CALIBRATE_VARIABLES,
-    WINDOWS = CALIBRATE_WINDOWS,
     WINDOW_SAMPLES = 64, // at least, in the first window
     SCREENED_FIRST = 32, // points for each start in the first window
     SCREENED = 16,       // and in later ones
     STEPS = 60,          // of a start in a window, tried
     EXPLORED = 192,      // points around the best fit
     EXPLORATIONS = 6,
-    IMPROVED = 5, // of them that are fitted
     HISTORY_MAX = 4096,
     SEGMENTS_MIN = 4,
     RUNS_MAX = 1 << 22, // more than a search can ask for
@@ -53,11 +51,12 @@ static const double window_growth = 1.4142; // of the length of windows
 static const double rough = 4;              // growth of effects by which valleys are missed
 static const double difference_share = 0.5; // of the deviation of one parameter alone
 static const double difference_first = 1e-5, difference_min = 1e-9, difference_max = 1e-4,
-                    difference_chaos = 5e-2;
+                    difference_chaos = 0.1;
 static const double correlation_max = 0.95; // of derivatives that are mostly noise
 // Of the variance of the noise: a decrease below it ends a fit, one above it begins another.
 static const double tolerance = 1e-3, improvement = 1e-2;
-static const double scatter = 2, scatter_max = 0.5; // standard errors; of the range
+static const double scatter = 2, explored[] = {0.7, 2, 5, 12, 30, 80}; // standard errors
+static const double scatter_max = 0.5;                                 // of the range
 static const double predictable = 1 / 3.0; // of the trust horizon: errors have grown 2000 times
 static const double enough = 0.2; // half width of an interval of the window before, of the range
 static const double undetermined = 0.5; // half width of an interval, of the range
@@ -321,24 +320,15 @@ static void calibrate_draw_start(CalibrateWork *work, size_t k, const CalibrateS
     }
 }
 
-// Adds points around those that were fitted, to be screened on the next window, whose valleys are
-// narrower.
-static void calibrate_scatter_starts(CalibrateWork *work) {
-    const size_t parents = work->start_count, all = SCREENED * (size_t)work->study->starts;
-    for (size_t k = parents; k < all; k++)
-        calibrate_draw_start(work, k, &work->starts[k % parents], scatter);
-    work->start_count = all;
-}
-
-// Leaves only the best point and others around it, near and far, that are to be explored.
-static void calibrate_explore(CalibrateWork *work) {
-    static const double scales[] = {0.7, 2, 5, 12, 30, 80};
-    work->stage = STAGE_EXPLORE;
-    work->explorations++;
-    calibrate_truncate_starts(work, 1);
-    for (size_t k = 1; k < EXPLORED; k++)
-        calibrate_draw_start(work, k, &work->starts[0], scales[k % COUNT(scales)]);
-    work->start_count = EXPLORED;
+// Leaves the best starts and adds points around them, `count` in all, at these multiples of their
+// standard errors.
+static void calibrate_scatter_starts(CalibrateWork *work, size_t parents, size_t count,
+                                     const double *scales, size_t scale_count) {
+    calibrate_truncate_starts(work, parents);
+    parents = work->start_count;
+    for (size_t k = parents; k < count; k++)
+        calibrate_draw_start(work, k, &work->starts[k % parents], scales[k % scale_count]);
+    work->start_count = count;
 }
 
 // --- Derivatives and steps ---
@@ -395,7 +385,6 @@ static void calibrate_remove_noise(const CalibrateWork *work, double cost, doubl
     }
 }
 
-// Of the best point each column is made twice, on both sides.
 static void calibrate_fold_column(CalibrateWork *work, CalibrateStart *start,
                                   const CalibrateRun *run, const CalibratePart *part) {
     double *column = work->columns[run->column];
@@ -568,9 +557,11 @@ static void calibrate_assess(CalibrateWork *work) {
         found->rivals[i] = (double)NAN;
     }
     // A point of the search that fits as well although the linear model excludes it, as one in
-    // another valley does, belongs to the intervals.
+    // another valley does, belongs to the intervals. Costs of chaotic motions scatter.
     found->is_ambiguous = false;
-    const double limit = calibrate_chi_square((double)n, calibrate_quantile_95) * variance;
+    const double noise = work->is_chaotic ? calibrate_quantile_999 * sqrt(2 * freedom) : 0;
+    const double limit =
+        (calibrate_chi_square((double)n, calibrate_quantile_95) + noise) * variance;
     for (size_t k = 0; k < work->points.count; k++) {
         const CalibratePoint *point = &work->points.at[k];
         if (point->cost - fit->cost > limit || calibrate_predict(fit, point->at) < 2 * limit)
@@ -616,8 +607,9 @@ static Status calibrate_end_window(CalibrateWork *work) {
     for (size_t i = 0; i < work->start_count; i++)
         memcpy(result->starts[i], work->starts[i].fit.at, sizeof result->starts[i]);
     if (work->window + 1 < work->windows) {
-        calibrate_scatter_starts(work);
-        work->window++;
+        calibrate_scatter_starts(work, CALIBRATE_KEPT, SCREENED * (size_t)work->study->starts,
+                                 &scatter, 1);
+        work->window++; // its valleys are narrower
         return calibrate_open(work, STAGE_SCREEN);
     }
     work->stage = STAGE_COVARIANCE;
@@ -663,13 +655,14 @@ static Status calibrate_advance(CalibrateWork *work) {
     if (work->stage == STAGE_FIT)
         return calibrate_end_window(work);
     if (work->stage == STAGE_COVARIANCE) {
-        calibrate_explore(work);
+        calibrate_scatter_starts(work, 1, EXPLORED, explored, COUNT(explored));
+        work->stage = STAGE_EXPLORE;
+        work->explorations++;
         return STATUS_OK;
     }
     // Spectra are compared over the whole record also where it cannot be predicted.
     work->is_chaotic = work->fit == CALIBRATE_PSD && !isnan(work->starts[0].horizon);
-    calibrate_truncate_starts(work,
-                              work->stage == STAGE_SCREEN ? (size_t)work->study->starts : IMPROVED);
+    calibrate_truncate_starts(work, (size_t)work->study->starts);
     calibrate_begin_stage(work, STAGE_FIT);
     return STATUS_OK;
 }
@@ -720,7 +713,7 @@ static void calibrate_make_windows(CalibrateWork *work) {
         to = fmax(to, measured_time(channel, channel->samples.count - 1));
         samples += channel->samples.count;
     }
-    for (int k = WINDOWS - 1; k >= 0; k--) {
+    for (int k = CALIBRATE_WINDOWS - 1; k >= 0; k--) {
         const double share = pow(window_growth, -k);
         const bool is_short =
             share * (double)samples < (double)(WINDOW_SAMPLES + 4 * work->variables);
@@ -755,8 +748,7 @@ Status calibrate_begin(void *of, const StudyTools *tools, Problem *problem) {
     work->targets = calloc(count, sizeof *work->targets);
     work->deviations = calloc(count, sizeof *work->deviations);
     work->starts = calloc(screened + EXPLORED, sizeof *work->starts);
-    work->runs =
-        calloc(screened + EXPLORED + 2 * (starts + IMPROVED) * VARIABLES, sizeof *work->runs);
+    work->runs = calloc(screened + EXPLORED + 2 * starts * VARIABLES, sizeof *work->runs);
     TRY(status_made(work->targets != NULL && work->deviations != NULL && work->starts != NULL &&
                     work->runs != NULL));
     work->start_count = screened;

@@ -92,17 +92,17 @@ static const Field calibration_failure_fields[] = {
 static const Field calibration_fields[] = {
     FIELD_COUNT(Calibration, runs, NULL, AT_MIN(0), 0, "runs made"),
     FIELD_COUNT(Calibration, failed, NULL, AT_MIN(0), 0, "runs that failed"),
-    FIELD_CHOICE(Calibration, fit, calibrate_fit_names, OPTIONAL, "what was fitted in the end"),
+    FIELD_CHOICE(Calibration, fit, calibrate_fit_names, OPTIONAL, "what was fitted in the end: time, or psd where the motion cannot be predicted far enough"),
     FIELD_LIST(Calibration, parameters, calibrated_parameter_fields, 0, PRESENCE_DEFAULT, "fitted parameters, in the order of the request"),
     FIELD_ROWS_OR_NULL(Calibration, correlation, NULL, "correlation of the fitted values, in that order"),
     FIELD_REAL(Calibration, shift, "s", ANY, OPTIONAL, "by which the measured times are moved to later times"),
-    FIELD_REAL(Calibration, shift_error, "s", ANY, OPTIONAL, "standard error of the shift"),
+    FIELD_REAL(Calibration, shift_error, "s", ANY, OPTIONAL, "standard deviation of the shift, if it was fitted"),
     {.name = "residual_rms", .kind = FIELD_KIND_LIST, .offset = FIELD_LIST_AT(Calibration, residuals), .fields = calibration_residual_fields, .size = sizeof(CalibrationResidual), .presence = PRESENCE_DEFAULT, .doc = "differences between fit and measurement, channel by channel"},
     FIELD_REAL(Calibration, chi_square, NULL, ANY, OPTIONAL, "sum of squared differences over the squared given deviations; unknown without them"),
-    FIELD_COUNT(Calibration, freedom, NULL, AT_MIN(0), OPTIONAL, "its degrees of freedom"),
+    FIELD_COUNT(Calibration, freedom, NULL, AT_MIN(0), OPTIONAL, "degrees of freedom of chi_square: samples with a given deviation, less the numbers fitted"),
     FIELD_CHOICE(Calibration, verdict, calibrate_verdict_names, OPTIONAL, "whether the fitted scene explains the measured motions, and these determine all parameters"),
     FIELD_TEXT(Calibration, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
-    FIELD_LIST(Calibration, motions, calibration_motion_fields, 0, PRESENCE_DEFAULT, "measured and fitted motions, thinned"),
+    FIELD_LIST(Calibration, motions, calibration_motion_fields, 0, PRESENCE_DEFAULT, "each measured channel and the same of the fitted scene, at most 1000 points of them"),
     FIELD_LIST(Calibration, history, calibration_step_fields, 0, PRESENCE_DEFAULT, "steps of the search"),
     FIELD_LIST(Calibration, failures, calibration_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
     FIELD_LIST(Calibration, warnings, warning_fields, 0, PRESENCE_DEFAULT, "doubts"),
@@ -110,59 +110,53 @@ static const Field calibration_fields[] = {
 };
 // clang-format on
 
-// What rows cannot express of a measured channel.
-static Status calibrate_check_channel(const CalibrateStudy *study, double duration, size_t i,
+// That a measured channel has samples to fit, and that runs can have it at its interval.
+static Status calibrate_check_channel(const CalibrateStudy *study, const Simulation *simulation,
+                                      const SimulationLimits *limits, size_t i, Problem *own,
                                       Problem *problem) {
     const size_t min = study->fit == CALIBRATE_PSD ? SPECTRUM_SAMPLES_MIN : SAMPLES_MIN;
-    const MeasuredChannel *measured = &study->measured.at[i];
+    const double duration = simulation->scene.duration;
     const JsonPointer place = json_pointer_at("/study/measured", i);
-    const double end = measured_time(measured, measured->samples.count - 1);
-    const double from = fmax(measured->start, study->max_shift);
+    MeasuredChannel measured = study->measured.at[i];
+    const double end = measured_time(&measured, measured.samples.count - 1);
+    const double from = fmax(measured.start, study->max_shift);
     const double to = fmin(end, duration - study->max_shift);
+    Status status = STATUS_OK;
     if (end > duration * (1 + 1e-9))
-        return json_pointer_fault(problem, place.at, "samples",
-                                  "end at %s s, the scene ends at %s s: give the scene a longer "
-                                  "duration, or fewer samples",
-                                  real_text(end).at, real_text(duration).at);
-    if (!((to - from) / measured->interval + 1.000001 >= (double)min))
-        return json_pointer_fault(problem, place.at, "samples",
-                                  "must be at least %zu within the scene%s, for a fit of %s", min,
-                                  study->max_shift > 0 ? ", also when they are moved by max_shift"
-                                                       : "",
-                                  study->fit == CALIBRATE_PSD ? "spectra" : "motions");
-    if (!(measured_rms(measured) > rms_min))
-        return json_pointer_fault(
-            problem, place.at, "samples",
-            "have the same value, or differ by less than %g: there is no motion to "
-            "fit",
-            rms_min);
-    return STATUS_OK;
-}
-
-// That runs can have a measured channel, at its interval.
-static Status calibrate_check_base(const CalibrateStudy *study, const Simulation *simulation,
-                                   const SimulationLimits *limits, size_t i, Problem *own,
-                                   Problem *problem) {
-    MeasuredChannel channel = study->measured.at[i];
-    Simulation base = {0};
-    const JsonPointer place = json_pointer_at("/study/measured", i);
-    if (strcmp(channel.channel, CHANNEL_USUAL) == 0)
+        status = json_pointer_fault(problem, place.at, "samples",
+                                    "end at %s s, the scene ends at %s s: give the scene a longer "
+                                    "duration, or fewer samples",
+                                    real_text(end).at, real_text(duration).at);
+    else if (!((to - from) / measured.interval + 1.000001 >= (double)min))
+        status = json_pointer_fault(problem, place.at, "samples",
+                                    "must be at least %zu within the scene%s, for a fit of %s", min,
+                                    study->max_shift > 0 ? ", also when they are moved by max_shift"
+                                                         : "",
+                                    study->fit == CALIBRATE_PSD ? "spectra" : "motions");
+    else if (!(measured_rms(&measured) > rms_min))
+        status = json_pointer_fault(problem, place.at, "samples",
+                                    "have the same value, or differ by less than %g: there is no "
+                                    "motion to fit",
+                                    rms_min);
+    if (strcmp(measured.channel, CHANNEL_USUAL) == 0)
         return json_pointer_fault(problem, place.at, "channel",
                                   "must name one channel, as displacement");
-    channel.interval = study->measured.at[0].interval;
+    Simulation base = {0};
+    measured.interval = study->measured.at[0].interval;
     problem_clear(own);
-    Status status = calibrate_make_base(&(MeasuredChannels){&channel, 1}, simulation,
-                                        simulation->scene.duration, &base);
-    if (status == STATUS_OK)
-        status = simulation_complete(&base, limits, NULL, own);
+    Status made =
+        calibrate_make_base(&(MeasuredChannels){&measured, 1}, simulation, duration, &base);
+    if (made == STATUS_OK)
+        made = simulation_complete(&base, limits, NULL, own);
     simulation_clear(&base);
     const Fault *fault = &own->faults[0];
-    if (status == STATUS_INVALID && strncmp(fault->pointer, "/output/channels", 16) == 0)
-        return json_pointer_fault(problem, place.at, "channel", "%s", fault->detail);
-    return status == STATUS_INVALID ? json_pointer_fault(problem, "/study/measured/0", "interval",
-                                                         "gives a scene that is not valid: %s: %s",
-                                                         fault->pointer, fault->detail)
-                                    : status;
+    if (made == STATUS_INVALID && strncmp(fault->pointer, "/output/channels", 16) == 0)
+        made = json_pointer_fault(problem, place.at, "channel", "%s", fault->detail);
+    else if (made == STATUS_INVALID)
+        made = json_pointer_fault(problem, "/study/measured/0", "interval",
+                                  "gives a scene that is not valid: %s: %s", fault->pointer,
+                                  fault->detail);
+    return study_first_failure(status, made);
 }
 
 static Status calibrate_check_measured(const CalibrateStudy *study, const Simulation *simulation,
@@ -176,9 +170,7 @@ static Status calibrate_check_measured(const CalibrateStudy *study, const Simula
     for (size_t i = 0; i < study->measured.count; i++) {
         samples += study->measured.at[i].samples.count;
         status = study_first_failure(
-            status, calibrate_check_channel(study, simulation->scene.duration, i, problem));
-        status = study_first_failure(
-            status, calibrate_check_base(study, simulation, limits, i, own, problem));
+            status, calibrate_check_channel(study, simulation, limits, i, own, problem));
     }
     if (samples > MEASURED_SAMPLES)
         status = problem_add(problem, STATUS_INVALID, "/study/measured",
@@ -261,20 +253,17 @@ static Status calibrate_complete(void *request, const Simulation *simulation,
     return status;
 }
 
-// Runs of the search at the full duration, about.
-static double calibrate_expected(const CalibrateStudy *study) {
-    return (double)study->starts * (50 + 10 * (double)(study->parameters.count + 1)) + 250;
-}
-
 static Status calibrate_cost(const void *request, const Simulation *simulation,
                              const SimulationLimits *limits, double *steps) {
     const CalibrateStudy *study = request;
+    const double variables = (double)study->parameters.count + 1;
+    const double runs = (double)study->starts * (50 + 10 * variables) + 250; // of full length
     Simulation base = {0};
     (void)limits;
     const Status status =
         calibrate_make_base(&study->measured, simulation, simulation->scene.duration, &base);
     if (status == STATUS_OK)
-        *steps = calibrate_expected(study) * simulation_cost(&base).steps;
+        *steps = runs * simulation_cost(&base).steps;
     simulation_clear(&base);
     return status;
 }

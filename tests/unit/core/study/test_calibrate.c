@@ -168,6 +168,28 @@ TEST(spectra_are_fitted_on_request) {
     study_request_clear(&request);
 }
 
+TEST(a_chaotic_motion_is_fitted_by_its_spectrum_with_an_interval_that_allows_for_its_scatter) {
+    StudyRequest request = request_make();
+    ExcitationSine *sine = (ExcitationSine *)(void *)variant_new(&excitation_sine.kind);
+    assert_non_null(sine);
+    sine->frequency = 4.85;
+    sine->amplitude = 1;
+    variant_free(request.simulation.scene.excitation);
+    request.simulation.scene.excitation = (Variant *)(void *)sine;
+    request.simulation.scene.duration = 60;
+    measure(&request, &request.simulation, 0.02);
+    study_of(&request)->fit = CALIBRATE_PSD;
+    study_of(&request)->starts = 1;
+    request.simulation.output.psd.segment = 512;
+    parameter_add(&request, "/structure/stiffness", 750, 1100);
+    Calibration *answer = calibrate(&request);
+    assert_contains(&answer->parameters.at[0], 865);
+    assert_non_null(strstr(answer->warnings.at[0].detail, "cannot be predicted to the end"));
+    assert_true(answer->parameters.at[0].standard_error > 0.1);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
 static void assert_refused(StudyRequest *request, const char *pointer, const char *detail) {
     problem_clear(&problem);
     if (study_request_complete(request, NULL, NULL, &problem) != STATUS_INVALID)
