@@ -144,7 +144,7 @@ static const AnswerFormats all[] = {
     {&study_ensemble, with_table, ensemble_table, chart_ensemble},
     {&study_sweep, table_formats, NULL, sweep_chart},
     {&study_compare, with_table, compare_table, chart_compare},
-    {&study_response, with_table, response_curve_table, chart_response},
+    {&study_response, with_table, response_table, chart_response},
     {&study_sensitivity, with_table, sensitivity_table, chart_sensitivity},
     {&study_fragility, with_table, fragility_table, chart_fragility},
     {&study_calibrate, with_table, calibration_table, chart_calibration},

@@ -83,7 +83,7 @@ void chart_ensemble(const Variant *answer, Bytes *bytes);
 // The spectra and the displacements of all variants.
 void chart_compare(const Variant *answer, Bytes *bytes);
 // A row for each point; see core/study/response_curve.h.
-void response_curve_table(const Variant *answer, StudyTable *table);
+void response_table(const Variant *answer, StudyTable *table);
 // Amplitudes over the axis with and without dampers, unstable ones dashed, and the sections.
 void chart_response(const Variant *answer, Bytes *bytes);
 // The spectra of the drawn runs, and a table of the slopes.

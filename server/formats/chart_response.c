@@ -104,7 +104,7 @@ static const char *response_direction(int direction) {
     return direction == CURVE_UP ? "up" : direction == CURVE_DOWN ? "down" : "continued";
 }
 
-void response_curve_table(const Variant *answer, StudyTable *table) {
+void response_table(const Variant *answer, StudyTable *table) {
     const ResponseCurve *curve = (const ResponseCurve *)(const void *)answer;
     for (size_t k = 0; k < curve->points.count; k++) {
         const ResponsePoint *point = &curve->points.at[k];
