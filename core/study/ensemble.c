@@ -273,18 +273,6 @@ static Status ensemble_base(const EnsembleStudy *study, const Simulation *simula
     return STATUS_OK;
 }
 
-// Draws table 0 of a row, of inputs `mixed` table 1.
-static Status ensemble_draw(const InputModel *model, size_t row, bool is_second, size_t mixed,
-                            double values[INPUT_NUMBERS_MAX], uint64_t again[INPUT_NUMBERS_MAX],
-                            Problem *problem) {
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < model->count && status == STATUS_OK; i++)
-        status =
-            input_model_draw(model, i, row, is_second || model->numbers[i].index == mixed ? 1 : 0,
-                             &values[i], &again[i], problem);
-    return status;
-}
-
 typedef struct EnsembleWork {
     StudyWork work;
     const EnsembleStudy *study;
@@ -309,19 +297,19 @@ typedef struct EnsemblePart {
 // Position of a member. Runs 0 and 1 of a base sample are rows of the table.
 typedef struct EnsemblePlace {
     size_t sample, run;
-    size_t mixed; // the input from table 1; SIZE_MAX: none, or all in run 1
+    int mixed; // the input from the second table
     uint64_t seed;
 } EnsemblePlace;
 
 static EnsemblePlace ensemble_place(const EnsembleWork *work, size_t member) {
-    EnsemblePlace place = {member / work->each, member % work->each, SIZE_MAX,
+    EnsemblePlace place = {member / work->each, member % work->each, INPUTS_NONE,
                            work->study->first_seed + member};
     if (!work->study->sobol_indices)
         return place;
-    place.mixed = place.run < 2 ? SIZE_MAX : place.run - 2;
+    place.mixed = place.run == 0 ? INPUTS_NONE : place.run == 1 ? INPUTS_ALL : (int)place.run - 2;
     // The seed is the last input.
     place.seed = work->study->first_seed + 2 * place.sample +
-                 (place.run == 1 || place.mixed == work->study->inputs.count ? 1 : 0);
+                 (place.run == 1 || place.mixed == (int)work->study->inputs.count ? 1 : 0);
     return place;
 }
 
@@ -333,8 +321,8 @@ static Status ensemble_scene(const void *of, size_t member, Simulation *scene, S
         TRY(fields_copy(simulation_fields, &work->base, scene));
     } else {
         double values[INPUT_NUMBERS_MAX];
-        TRY(ensemble_draw(&work->model, place.sample, place.run == 1, place.mixed, values,
-                          ((EnsemblePart *)(void *)part)->again, problem));
+        TRY(input_model_draw(&work->model, place.sample, place.mixed, values,
+                             ((EnsemblePart *)(void *)part)->again, problem));
         if (place.run < 2)
             TRY(study_copy_reals(values, work->model.count, &part->run.inputs));
         TRY(input_model_scene(&work->model, values, &work->base, work->work.limits, scene,

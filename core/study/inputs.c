@@ -350,19 +350,30 @@ InputModel input_model_make(const UncertainInputs *inputs, const Simulation *sim
     return model;
 }
 
-Status input_model_draw(const InputModel *model, size_t number, size_t row, size_t table,
-                        double *value, uint64_t *again, Problem *problem) {
-    const InputNumber *of = &model->numbers[number];
-    const size_t dimension = number + table * model->count;
-    *value = input_number_value(of, sampling_coordinate(&model->sampling, row, dimension));
+static Status input_number_draw(const InputNumber *number, const Sampling *sampling, size_t row,
+                                size_t dimension, double *value, uint64_t *again,
+                                Problem *problem) {
+    *value = input_number_value(number, sampling_coordinate(sampling, row, dimension));
     for (uint64_t i = 0; i < DRAWS_MAX; i++) {
-        if (isfinite(*value) && *value >= of->min && *value <= of->max)
+        if (isfinite(*value) && *value >= number->min && *value <= number->max)
             return STATUS_OK;
         ++*again;
-        *value = input_number_value(of, sampling_draw_again(&model->sampling, row, dimension, i));
+        *value = input_number_value(number, sampling_draw_again(sampling, row, dimension, i));
     }
-    return problem_add(problem, STATUS_INVALID, study_axis_pointer(&of->input->axis, 0),
+    return problem_add(problem, STATUS_INVALID, study_axis_pointer(&number->input->axis, 0),
                        "is out of its range in all of %d draws", (int)DRAWS_MAX);
+}
+
+Status input_model_draw(const InputModel *model, size_t row, int mixed,
+                        double values[INPUT_NUMBERS_MAX], uint64_t again[INPUT_NUMBERS_MAX],
+                        Problem *problem) {
+    for (size_t i = 0; i < model->count; i++) {
+        const InputNumber *number = &model->numbers[i];
+        const bool is_second = mixed == INPUTS_ALL || mixed == (int)number->index;
+        TRY(input_number_draw(number, &model->sampling, row, i + (is_second ? model->count : 0),
+                              &values[i], &again[i], problem));
+    }
+    return STATUS_OK;
 }
 
 // Factors are those of the base's numbers, values are set after them.

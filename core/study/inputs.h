@@ -87,13 +87,16 @@ typedef struct InputModel {
     Sampling sampling;
 } InputModel;
 
-// Borrows `inputs`. Dimension d of a second, independent table of draws is d + count.
+// Borrows `inputs`.
 InputModel input_model_make(const UncertainInputs *inputs, const Simulation *simulation,
                             Sampling sampling);
 
-// Draws a number; *again counts values that were out of range. STATUS_INVALID if all were.
-Status input_model_draw(const InputModel *model, size_t number, size_t row, size_t table,
-                        double *value, uint64_t *again, Problem *problem);
+// Draws the numbers of a row; those of the input `mixed`, or of all, from a second, independent
+// table. again[i] counts values of number i that were out of range. STATUS_INVALID if all were.
+enum { INPUTS_NONE = -1, INPUTS_ALL = -2 };
+Status input_model_draw(const InputModel *model, size_t row, int mixed,
+                        double values[INPUT_NUMBERS_MAX], uint64_t again[INPUT_NUMBERS_MAX],
+                        Problem *problem);
 
 // The completed scene with all numbers set. Cleared by simulation_clear in any case.
 Status input_model_scene(const InputModel *model, const double *values, const Simulation *base,
