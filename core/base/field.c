@@ -294,6 +294,13 @@ static int reals_compare(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+bool reals_are_zero(const Reals *reals) {
+    for (size_t i = 0; i < reals->count; i++)
+        if (reals->at[i] != 0)
+            return false;
+    return true;
+}
+
 void reals_sort(double *values, size_t count) {
     if (count > 0)
         qsort(values, count, sizeof *values, reals_compare);

@@ -281,6 +281,9 @@ static inline bool real_same(double a, double b) {
 // Allocates `count` zeros, owned by `reals`. Without memory: false, and `reals` is empty.
 bool reals_allocate(Reals *reals, size_t count);
 
+// Whether there is none but zeros.
+bool reals_are_zero(const Reals *reals);
+
 // Sorts numbers in ascending order.
 void reals_sort(double *values, size_t count);
 // Appends an element of zeros to a typed list. Returns it, or NULL without memory.

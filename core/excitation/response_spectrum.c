@@ -22,6 +22,10 @@ enum { STATES = 4, ORDER = 18, CHECK_STEPS = 1 << 17 };
 static const double PHASE_MAX = 0.5;
 static const double TWO_PI = 6.28318530717958647693;
 
+static double oscillator_pieces(double period, double interval) {
+    return fmax(ceil(TWO_PI / period * interval / PHASE_MAX), 1);
+}
+
 typedef struct Oscillator {
     double omega, damping_ratio;
     size_t pieces;          // of a sample interval
@@ -35,7 +39,7 @@ static Oscillator oscillator_make(double period, double damping_ratio, double in
                                   double a_max) {
     const double omega = TWO_PI / period, xi = damping_ratio;
     Oscillator one = {.omega = omega, .damping_ratio = xi};
-    one.pieces = (size_t)fmax(ceil(omega * interval / PHASE_MAX), 1);
+    one.pieces = (size_t)oscillator_pieces(period, interval);
     const double h = one.length = interval / (double)one.pieces, sag = h * h / 8;
     const long double w = omega;
     const long double matrix[STATES * STATES] = {0, 1, 0, 0, -w * w, -2 * xi * w, -1, 0,
@@ -111,7 +115,7 @@ double response_spectrum_steps(const double *periods, size_t period_count, size_
                                double interval) {
     double steps = 0;
     for (size_t i = 0; i < period_count; i++)
-        steps += fmax(ceil(TWO_PI / periods[i] * interval / PHASE_MAX), 1) * (double)sample_count;
+        steps += oscillator_pieces(periods[i], interval) * (double)sample_count;
     return steps;
 }
 

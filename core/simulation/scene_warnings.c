@@ -140,18 +140,11 @@ static Status warnings_of_excitation(const Scene *scene, Warnings *warnings) {
     return STATUS_OK;
 }
 
-static bool warnings_are_zero(const Reals *reals) {
-    for (size_t i = 0; i < reals->count; i++)
-        if (reals->at[i] != 0)
-            return false;
-    return true;
-}
-
 // The default excitation is free vibration from rest: if it was forgotten the result is all zeros.
 static Status warnings_of_rest(const Scene *scene, Warnings *warnings) {
     const Excitation *excitation = scene_excitation(scene);
     if (excitation_kind(excitation) != &excitation_free ||
-        !warnings_are_zero(&excitation->displacement) || !warnings_are_zero(&excitation->velocity))
+        !reals_are_zero(&excitation->displacement) || !reals_are_zero(&excitation->velocity))
         return STATUS_OK;
     for (size_t i = 0; i < scene->dampers.count; i++)
         if (scene->dampers.at[i].velocity != 0)

@@ -383,13 +383,6 @@ Status study_scene_use_record(Simulation *scene, const PinnedRecord *pinned) {
     return status_made(record_resolve(record, (NamedRecord *)(void *)pinned->named));
 }
 
-static bool reals_are_zero(const Reals *reals) {
-    bool are_zero = true;
-    for (size_t i = 0; i < reals->count; i++)
-        are_zero = are_zero && reals->at[i] == 0;
-    return are_zero;
-}
-
 Status study_suite_prepare(const PinnedRecords *suite, Simulation *simulation, Problem *problem) {
     const Excitation *excitation = scene_excitation(&simulation->scene);
     if (excitation != NULL && excitation_kind(excitation) == &excitation_record)
