@@ -101,8 +101,7 @@ StudyValue study_axis_value(const StudyAxis *axis, size_t index) {
 
 Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, Problem *problem) {
     const bool has_range = !isnan(axis->from) || !isnan(axis->to) || axis->count != COUNT_ABSENT;
-    const char *needs = is_grid ? "needs values, or a range of from, to and count"
-                                : "needs values, or a range of from and to";
+    const char *range = is_grid ? "from, to and count" : "from and to";
     if ((axis->pointer != NULL) == (axis->pointers.count > 0))
         return problem_add(problem, STATUS_INVALID, place,
                            axis->pointer != NULL
@@ -110,13 +109,12 @@ Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, 
                                : "needs a pointer, or pointers of tied members");
     if (axis->values.count > 0 && (has_range || axis->spacing != CHOICE_ABSENT))
         return problem_add(problem, STATUS_INVALID, place,
-                           is_grid ? "has values and a range: leave out values, or from, to, "
-                                     "count and spacing"
-                                   : "has values and a range: leave out values, or from and to");
+                           "has values and a range: leave out values, or %s%s", range,
+                           is_grid ? " and spacing" : "");
     if (axis->values.count > 0)
         return STATUS_OK;
     if (isnan(axis->from) || isnan(axis->to) || (is_grid && axis->count == COUNT_ABSENT))
-        return problem_add(problem, STATUS_INVALID, place, "%s", needs);
+        return problem_add(problem, STATUS_INVALID, place, "needs values, or a range of %s", range);
     if (!isfinite(axis->to - axis->from))
         return problem_add(problem, STATUS_INVALID, place,
                            "is wider than a number can hold: from %s to %s",
@@ -142,14 +140,13 @@ static Status study_axes_check_pointer(const StudyAxes *axes, bool is_grid, size
     const char *pointer = study_axis_pointer(&axes->at[number], index);
     for (size_t i = 0; i <= number; i++) {
         const size_t count = i < number ? study_axis_pointer_count(&axes->at[i]) : index;
-        for (size_t k = 0; k < count; k++)
-            if (is_grid ? strcmp(study_axis_pointer(&axes->at[i], k), pointer) == 0
-                        : json_pointer_overlaps(study_axis_pointer(&axes->at[i], k), pointer))
+        for (size_t k = 0; k < count; k++) {
+            const char *other = study_axis_pointer(&axes->at[i], k);
+            if (is_grid ? strcmp(other, pointer) == 0 : json_pointer_overlaps(other, pointer))
                 return problem_add(problem, STATUS_INVALID,
                                    study_axis_place(&axes->at[number], place, index).at,
-                                   is_grid ? "is also the pointer of axis %zu: give one axis each"
-                                           : "is also set by entry %zu: give one entry each",
-                                   i);
+                                   "is also set by entry %zu: give one entry each", i);
+        }
     }
     return STATUS_OK;
 }
