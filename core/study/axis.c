@@ -309,14 +309,19 @@ bool study_field_is_real(const Field *field, bool is_tag) {
 }
 
 Status study_axes_find(const StudyAxes *axes, const Simulation *simulation, const char *place,
-                       Problem *problem) {
+                       const Field **rows, bool *are_tags, Problem *problem) {
     Simulation scene;
     Status status = fields_copy(simulation_fields, simulation, &scene);
     for (size_t i = 0; i < axes->count && status != STATUS_NO_MEMORY; i++) {
         bool is_tag;
-        if (study_axis_find(&axes->at[i], &scene, &is_tag, json_pointer_at(place, i).at, problem) ==
-            NULL)
+        const Field *row =
+            study_axis_find(&axes->at[i], &scene, &is_tag, json_pointer_at(place, i).at, problem);
+        if (row == NULL)
             status = STATUS_INVALID;
+        if (rows != NULL) {
+            rows[i] = row;
+            are_tags[i] = row != NULL && is_tag;
+        }
     }
     simulation_clear(&scene);
     return status;

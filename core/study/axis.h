@@ -100,9 +100,10 @@ const Field *study_axis_find(const StudyAxis *axis, Simulation *scene, bool *is_
                              const char *place, Problem *problem);
 // Whether a member, of this row, takes every number of its range.
 bool study_field_is_real(const Field *field, bool is_tag);
-// Validates that the pointers of all axes are in the completed simulation.
+// The same of all axes in the completed simulation; `rows` and `are_tags`, one of each axis, may be
+// NULL. STATUS_INVALID if a row is NULL.
 Status study_axes_find(const StudyAxes *axes, const Simulation *simulation, const char *place,
-                       Problem *problem);
+                       const Field **rows, bool *are_tags, Problem *problem);
 
 // The completed scene with a value for each axis, set in their order. `is_bare`: without output.
 // `names` may be NULL. Cleared by simulation_clear in any case. Faults have the pointers of the

@@ -194,24 +194,19 @@ static bool optimize_is_ordered(const StudyAxis *axis) {
 // The variables of the search: a range of whole numbers is a choice with an order.
 static Status optimize_variables(const OptimizeWork *work, SearchSpace *space, Problem *problem) {
     const StudyAxes *axes = &work->study->variables;
-    Simulation scene;
-    Status status = fields_copy(simulation_fields, work->work.simulation, &scene);
-    for (; space->variables < axes->count && status == STATUS_OK; space->variables++) {
+    const Field *rows[SEARCH_VARIABLES];
+    bool are_tags[SEARCH_VARIABLES];
+    TRY(study_axes_find(axes, work->work.simulation, "/study/variables", rows, are_tags, problem));
+    for (; space->variables < axes->count; space->variables++) {
         const StudyAxis *axis = &axes->at[space->variables];
-        const JsonPointer place = json_pointer_at("/study/variables", space->variables);
         SearchVariable *variable = &space->variable[space->variables];
-        bool is_tag;
-        const Field *field = study_axis_find(axis, &scene, &is_tag, place.at, problem);
-        if (field == NULL)
-            status = STATUS_INVALID;
-        else if (!study_axis_is_range(axis))
+        if (!study_axis_is_range(axis))
             *variable = (SearchVariable){axis->values.count, optimize_is_ordered(axis)};
-        else if (field->kind == FIELD_KIND_COUNT)
+        else if (rows[space->variables]->kind == FIELD_KIND_COUNT)
             *variable =
                 (SearchVariable){(size_t)fmin(floor(axis->to) - ceil(axis->from) + 1, 1e9), true};
     }
-    simulation_clear(&scene);
-    return status;
+    return STATUS_OK;
 }
 
 static Status optimize_search_new(OptimizeWork *work, Problem *problem) {
@@ -472,7 +467,7 @@ static Status optimize_complete(void *request, const Simulation *simulation,
         optimize_check_runs(study, problem),
     };
     TRY(all[0]);
-    TRY(study_axes_find(&study->variables, simulation, place, problem));
+    TRY(study_axes_find(&study->variables, simulation, place, NULL, NULL, problem));
     TRY(optimize_check_values(study, simulation, limits, problem));
     TRY(status_first(all, COUNT(all)));
     const OptimizeWork work = {.study = study,

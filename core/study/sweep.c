@@ -184,22 +184,6 @@ static Status sweep_grid_check_size(const SweepStudy *study, const SimulationLim
     return STATUS_OK;
 }
 
-// Earlier axes may make a member by their values.
-static Status sweep_grid_find_fields(SweepGrid *grid, Problem *problem) {
-    Simulation scene;
-    Status status = fields_copy(simulation_fields, grid->simulation, &scene);
-    for (size_t i = 0; i < grid->axis_count && status == STATUS_OK; i++) {
-        SweepValues *values = &grid->axes[i];
-        const JsonPointer place = json_pointer_at("/study/axes", i);
-        values->field = study_axis_find(values->axis, &scene, &values->is_tag, place.at, problem);
-    }
-    simulation_clear(&scene);
-    for (size_t i = 0; i < grid->axis_count && status == STATUS_OK; i++)
-        if (grid->axes[i].field == NULL)
-            status = STATUS_INVALID;
-    return status;
-}
-
 Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
                       const SimulationLimits *limits, SweepGrid **made, Problem *problem) {
     *made = NULL;
@@ -220,7 +204,15 @@ Status sweep_grid_new(const SweepStudy *study, const Simulation *simulation,
         stride *= values->count;
     }
     *made = grid;
-    return study_result(sweep_grid_find_fields(grid, problem), problem);
+    const Field *rows[STUDY_AXES];
+    bool are_tags[STUDY_AXES];
+    const Status status =
+        study_axes_find(&study->axes, simulation, "/study/axes", rows, are_tags, problem);
+    for (size_t i = 0; i < grid->axis_count; i++) {
+        grid->axes[i].field = status != STATUS_NO_MEMORY ? rows[i] : NULL;
+        grid->axes[i].is_tag = status != STATUS_NO_MEMORY && are_tags[i];
+    }
+    return study_result(status, problem);
 }
 
 // Whether `pointer` is `above` or below it.
