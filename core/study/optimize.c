@@ -24,8 +24,9 @@ enum {
     RECORDS_MAX = 1000,
     CANDIDATES_MAX = 5000,
     ALL_RUNS_MAX = 1000000, // of all candidates: objectives of each are kept
-    PENDING_RUNS = 16,
-    VALUES_CHECKED = 256, // of a list, with the request
+    PENDING_RUNS = 16,      // about so many can be made at the same time
+    PENDING_SHARE = 32,     // about one of so many candidates may be without results
+    VALUES_CHECKED = 256,   // of a list, with the request
     COST_SAMPLES = 16,
     UNDAMPED = 1,      // group of runs; 0: the given scene
     GROUPS_BEFORE = 2, // the first one of a candidate
@@ -577,13 +578,15 @@ static Status optimize_begin(void *of, const StudyTools *tools, Problem *problem
         *objective = study->objectives.at[i];
     }
     work->runs = optimize_runs(study);
-    work->pending = 1 + (PENDING_RUNS - 1) / work->runs;
     work->aggregate =
         (RunAggregate){study->statistic.of == OPTIMIZE_MAX, study->statistic.quantile};
     work->has_force = simulation_has_force(work->work.simulation);
     TRY(optimize_search_new(work, problem));
     const size_t candidates = work->search->space.candidates,
+                 pending = 1 + (PENDING_RUNS - 1) / work->runs,
+                 few = 1 + candidates / PENDING_SHARE,
                  objectives = candidates * work->runs * study->objectives.count;
+    work->pending = pending < few ? pending : few;
     work->collected = calloc(work->runs, sizeof *work->collected);
     work->column = calloc(work->runs, sizeof *work->column);
     work->metrics = calloc(candidates, sizeof *work->metrics);

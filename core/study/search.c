@@ -10,8 +10,9 @@
 // Two objectives are reduced to one by weights that differ from candidate to candidate (Knowles
 // 2006, "ParEGO"): max(w a, (1 - w) b) + 0.05 (w a + (1 - w) b) of the objectives scaled to 0 to 1.
 //
-// The first candidates fill the space, a Sobol sequence. Those without results reduce the variance
-// of the model, not its mean (Ginsbourger, Le Riche and Carraro 2010).
+// The first candidates fill the space, a Sobol sequence, and some later ones its better part. Those
+// without results reduce the variance of the model, not its mean (Ginsbourger, Le Riche and Carraro
+// 2010).
 #include "core/study/search.h"
 
 #include <math.h>
@@ -26,7 +27,8 @@ enum {
     ROWS = 160,                         // of the model at most
     RESPONSES = 1 + SEARCH_CONSTRAINTS, // modelled: an objective and the constraints
     PARAMETERS = SEARCH_VARIABLES + 2,  // logarithms of lengths, share and scale of the jumps
-    CENTRES = 4,                        // candidates around which others are tried
+    STARTS = 8,                         // of the choice of a candidate
+    SCATTER = 3,                        // so many candidates for one that needs no model
     FIRST_FITS = 8,                     // of each parameter
 };
 
@@ -46,7 +48,7 @@ typedef struct SearchRank {
 } SearchRank;
 
 typedef struct SearchModel {
-    Sampling filling, drawing; // of the first candidates; of those among which one is chosen
+    Sampling filling, drawing; // of the first candidates; of starts
     SearchRank *ranks;         // of the candidates with results
     double parameter[PARAMETERS], step[PARAMETERS];
     size_t fits;
@@ -88,11 +90,6 @@ static double search_value(const SearchVariable *variable, double share) {
                : fmin(floor(share * (double)variable->values), (double)(variable->values - 1));
 }
 
-// Points among which each candidate is chosen.
-static size_t search_tries(const Search *search) {
-    return 60 + 30 * search->space.variables;
-}
-
 static const SearchRange *search_range(const Search *search, size_t parameter) {
     const size_t n = search->space.variables;
     return parameter < n ? &search_length : parameter == n ? &search_share : &search_scale;
@@ -119,8 +116,8 @@ Status search_new(const SearchSpace *space, Search **made) {
         *made = NULL;
         return STATUS_NO_MEMORY;
     }
-    model->filling = (Sampling){SAMPLING_SOBOL, space->seed, candidates};
-    model->drawing = (Sampling){SAMPLING_RANDOM, space->seed, candidates * search_tries(search)};
+    model->filling = (Sampling){.method = SAMPLING_SOBOL, .seed = space->seed};
+    model->drawing = (Sampling){.method = SAMPLING_RANDOM, .seed = space->seed};
     for (size_t j = 0; j < n + 2; j++) {
         model->parameter[j] = search_range(search, j)->mean;
         model->step[j] = 0.7;
@@ -222,17 +219,20 @@ static int search_compare(const void *a, const void *b) {
     const SearchRank *x = a, *y = b;
     if (x->violation != y->violation)
         return x->violation < y->violation ? -1 : 1;
-    if (x->value != y->value && !(isnan(x->value) && isnan(y->value)))
-        return x->value < y->value || isnan(y->value) ? -1 : 1;
+    if (x->value != y->value)
+        return x->value < y->value ? -1 : 1;
     return (x->candidate > y->candidate) - (x->candidate < y->candidate);
 }
 
 static void search_rank(Search *search) {
     SearchRank *ranks = search->model->ranks;
     const SearchScalar scalar = search_scalar(search);
-    for (size_t i = 0; i < search->added; i++)
+    for (size_t i = 0; i < search->added; i++) {
+        const double violation = search_violation(search, i);
+        const bool is_failed = violation == (double)INFINITY;
         ranks[i] =
-            (SearchRank){search_violation(search, i), search_scalar_value(search, &scalar, i), i};
+            (SearchRank){violation, is_failed ? 0 : search_scalar_value(search, &scalar, i), i};
+    }
     qsort(ranks, search->added, sizeof *ranks, search_compare);
 }
 
@@ -276,7 +276,8 @@ static void search_model_standardise(const Search *search, size_t response) {
         if (!isnan(target[i]))
             sorted[count++] = target[i];
     reals_sort(sorted, count);
-    const double median = sorted[count / 2], width = count > 0 ? median - sorted[0] : 0;
+    const double median = count > 0 ? sorted[count / 2] : 0,
+                 width = count > 0 ? median - sorted[0] : 0;
     for (size_t i = 0; i < model->known; i++) {
         if (response > 0)
             target[i] = copysign(log1p(fabs(target[i])), target[i]);
@@ -478,26 +479,19 @@ static double search_merit_callback(unsigned count, const double *share, double 
     return search_merit(context, point);
 }
 
-// Maximises the merit from shares, which are changed.
-static Status search_polish(Search *search, double *share, double *merit) {
+// Maximises the merit from shares, which are changed, by steps of the given length at first.
+static Status search_maximise(Search *search, double step, double *share, double *merit) {
     const unsigned n = (unsigned)search->space.variables;
-    double found[SEARCH_VARIABLES], value;
     nlopt_opt optimizer = nlopt_create(NLOPT_LN_SBPLX, n);
     TRY(status_made(optimizer != NULL));
-    memcpy(found, share, n * sizeof *found);
     nlopt_set_max_objective(optimizer, search_merit_callback, search);
     nlopt_set_lower_bounds1(optimizer, 0);
     nlopt_set_upper_bounds1(optimizer, 1);
-    nlopt_set_initial_step1(optimizer, 0.02);
+    nlopt_set_initial_step1(optimizer, step);
     nlopt_set_maxeval(optimizer, (int)(15 + 10 * n));
-    const nlopt_result result = nlopt_optimize(optimizer, found, &value);
+    const nlopt_result result = nlopt_optimize(optimizer, share, merit);
     nlopt_destroy(optimizer);
-    TRY(status_made(result != NLOPT_OUT_OF_MEMORY));
-    if ((result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && value > *merit) {
-        memcpy(share, found, n * sizeof *share);
-        *merit = value;
-    }
-    return STATUS_OK;
+    return status_made(result != NLOPT_OUT_OF_MEMORY);
 }
 
 static bool search_is_new(const Search *search, const double *point) {
@@ -507,59 +501,30 @@ static bool search_is_new(const Search *search, const double *point) {
     return true;
 }
 
-// Shares around those of a centre, or anywhere if that is NULL.
-static void search_draw(const Search *search, const double *centre, size_t row, double *share) {
-    static const double steps[] = {0.3, 0.1, 0.03, 0.01, 0.003};
+// The best maximum from several starts: the best candidates, and points anywhere.
+static Status search_choose(Search *search, double *chosen) {
     const Sampling *drawing = &search->model->drawing;
     const size_t n = search->space.variables;
-    const double step = steps[(size_t)(sampling_coordinate(drawing, row, 0) * COUNT(steps))];
-    const size_t always = (size_t)(sampling_coordinate(drawing, row, 1) * (double)n);
-    for (size_t j = 0; j < n; j++) {
-        const SearchVariable *variable = &search->space.variable[j];
-        const double is_changed = sampling_coordinate(drawing, row, 2 + 2 * j),
-                     u = sampling_coordinate(drawing, row, 3 + 2 * j);
-        share[j] = u;
-        if (centre == NULL)
-            continue;
-        const double own =
-            variable->values == 0 ? centre[j] : (centre[j] + 0.5) / (double)variable->values;
-        const bool has_order = variable->values == 0 || variable->is_ordered;
-        const double moved = fabs(own + step * (2 * u - 1));
-        if (j != always && is_changed > (has_order ? 3 / (double)n : 0.3))
-            share[j] = own;
-        else if (has_order)
-            share[j] = moved > 1 ? 2 - moved : moved;
+    double best = -INFINITY;
+    for (size_t i = 0; i < STARTS; i++) {
+        const size_t row = search->proposed * STARTS + i;
+        double share[SEARCH_VARIABLES], point[SEARCH_VARIABLES], merit = -INFINITY;
+        for (size_t j = 0; j < n; j++) {
+            const double values = fmax(1, (double)search->space.variable[j].values);
+            share[j] = sampling_coordinate(drawing, row, j);
+            if (i % 2 == 0 && i / 2 < search->added) {
+                const size_t centre = search->model->ranks[i / 2].candidate;
+                share[j] = (search_point(search, centre)[j] + (values > 1 ? 0.5 : 0)) / values;
+            }
+        }
+        const double step = pow(10, -1 - 2 * sampling_coordinate(drawing, row, n));
+        TRY(search_maximise(search, step, share, &merit));
+        search_point_at(search, share, point);
+        if (i == 0 || (merit > best && search_is_new(search, point))) {
+            best = search_is_new(search, point) ? merit : -INFINITY;
+            memcpy(chosen, point, n * sizeof *chosen);
+        }
     }
-}
-
-// The best of many, improved: most of them lie around the best candidates.
-static Status search_choose(Search *search, double *chosen) {
-    const size_t tries = search_tries(search),
-                 centres = search->added < CENTRES ? search->added : CENTRES;
-    double best = -INFINITY, share[SEARCH_VARIABLES] = {0}, point[SEARCH_VARIABLES];
-    bool is_found = false;
-    for (size_t i = 0; i < tries; i++) {
-        double own[SEARCH_VARIABLES];
-        const double *centre =
-            i % 3 == 0 || centres == 0
-                ? NULL
-                : search_point(search, search->model->ranks[i % centres].candidate);
-        search_draw(search, centre, search->proposed * tries + i, own);
-        search_point_at(search, own, point);
-        if (!search_is_new(search, point))
-            continue;
-        const double merit = search_merit(search, point);
-        if (is_found && !(merit > best))
-            continue;
-        is_found = true;
-        best = merit;
-        memcpy(share, own, sizeof share);
-        search_point_at(search, share, chosen);
-    }
-    TRY(search_polish(search, share, &best));
-    search_point_at(search, share, point);
-    if (!is_found || search_is_new(search, point))
-        memcpy(chosen, point, search->space.variables * sizeof *chosen);
     return STATUS_OK;
 }
 
@@ -577,14 +542,38 @@ static void search_fill(const Search *search, double *point) {
     }
 }
 
+// A point anywhere in the box around the best quarter of the sample: where the jumps are larger
+// than the slope, the model knows no better place.
+static void search_scatter(const Search *search, double *point) {
+    const SearchRank *ranks = search->model->ranks;
+    for (size_t j = 0; j < search->space.variables; j++) {
+        const bool is_real = search->space.variable[j].values == 0;
+        double low = INFINITY, high = -INFINITY;
+        for (size_t i = 0, found = 0; i < search->added && found < search->sample / 4; i++) {
+            if (ranks[i].candidate >= search->sample)
+                continue;
+            low = fmin(low, search_point(search, ranks[i].candidate)[j]);
+            high = fmax(high, search_point(search, ranks[i].candidate)[j]);
+            found++;
+        }
+        const double u = sampling_coordinate(&search->model->filling, search->proposed, j);
+        point[j] = is_real ? low + u * (high - low) : floor(low + u * (high - low + 1));
+    }
+}
+
 Status search_propose(Search *search) {
     double *point = search->points + search->proposed * search->space.variables;
     if (search->proposed < search->sample) {
         search_fill(search, point);
     } else {
+        const bool is_scattered = search->proposed % SCATTER == 0;
         search_rank(search);
-        search_model_make(search);
-        TRY(search_choose(search, point));
+        if (is_scattered)
+            search_scatter(search, point);
+        if (!is_scattered || !search_is_new(search, point)) {
+            search_model_make(search);
+            TRY(search_choose(search, point));
+        }
     }
     search->proposed++;
     return STATUS_OK;
