@@ -395,9 +395,9 @@ typedef struct LinearisedMotion {
     double peak;     // largest displacement of any storey so far [m]
     double *squares; // of each storey, integral of the square of its displacement [m^2 s]
 
-    double *before, *after;       // derivatives of the state on the two sides of an event
-    ContactPhase *phases;         // of the dampers before it
-    double *q, *p, *r, *w, *work; // the run's own state meanwhile, and scratch
+    double *before, *after; // derivatives of the state on the two sides of an event
+    ContactPhase *phases;   // of the dampers before it
+    double *state, *work;   // the run's own state meanwhile, and scratch
     double base_acceleration;
     TaylorStep arc;
     double *block;

@@ -16,22 +16,15 @@
 #include <string.h>
 
 Status linearised_motion_make(LinearisedMotion *motion, const ModalState *state, Problem *problem) {
-    const size_t n = state->padded, m = state->dampers;
     memset(motion, 0, sizeof *motion);
-    motion->size = 2 * (state->mode_count + m);
+    motion->size = 2 * (state->mode_count + state->dampers);
     const SimdArray arrays[] = {
-        {&motion->late, motion->size},
-        {&motion->before, motion->size},
-        {&motion->after, motion->size},
-        {&motion->squares, state->storey_count},
-        {&motion->q, n},
-        {&motion->p, n},
-        {&motion->r, m},
-        {&motion->w, m},
-        {&motion->work, n},
+        {&motion->late, motion->size},  {&motion->before, motion->size},
+        {&motion->after, motion->size}, {&motion->squares, state->storey_count},
+        {&motion->state, motion->size}, {&motion->work, state->padded},
     };
     motion->block = simd_kernels_allocate(arrays, COUNT(arrays));
-    motion->phases = calloc(m + 1, sizeof *motion->phases);
+    motion->phases = calloc(state->dampers + 1, sizeof *motion->phases);
     if (motion->block == NULL || motion->phases == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the linearised motion");
     return taylor_step_allocate(&motion->arc, state, problem);
@@ -45,22 +38,12 @@ void linearised_motion_clear(LinearisedMotion *motion) {
 
 // The run's own state gives way to columns, and returns.
 static void linearised_motion_save(LinearisedMotion *motion, const ModalState *state) {
-    memcpy(motion->q, state->q, state->padded * sizeof *motion->q);
-    memcpy(motion->p, state->p, state->padded * sizeof *motion->p);
-    for (size_t d = 0; d < state->dampers; d++) {
-        motion->r[d] = state->damper[d].r;
-        motion->w[d] = state->damper[d].w;
-    }
+    modal_state_gather(state, motion->state);
     motion->base_acceleration = state->base_acceleration;
 }
 
 static void linearised_motion_restore(const LinearisedMotion *motion, ModalState *state) {
-    memcpy(state->q, motion->q, state->padded * sizeof *motion->q);
-    memcpy(state->p, motion->p, state->padded * sizeof *motion->p);
-    for (size_t d = 0; d < state->dampers; d++) {
-        state->damper[d].r = motion->r[d];
-        state->damper[d].w = motion->w[d];
-    }
+    modal_state_scatter(state, motion->state);
     state->base_acceleration = motion->base_acceleration;
 }
 
@@ -111,8 +94,8 @@ void linearised_motion_end_step(LinearisedMotion *motion, const ModalState *stat
     const size_t n = state->mode_count;
     for (size_t j = 0; j < state->storey_count && motion->is_measured; j++) {
         const double *shape = state->modes->shapes + j * n;
-        const double x = modal_state_dot(shape, motion->q, n),
-                     slope = length * modal_state_dot(shape, motion->p, n),
+        const double x = modal_state_dot(shape, motion->state, n),
+                     slope = length * modal_state_dot(shape, motion->state + n, n),
                      moved = modal_state_dot(shape, state->q, n) - x,
                      end = length * modal_state_dot(shape, state->p, n);
         const double c[] = {x, slope, 3 * moved - 2 * slope - end, slope + end - 2 * moved};
