@@ -445,13 +445,15 @@ Status simulation_cycle_flow(const Simulation *simulation, const SimulationLimit
                            "must be sine, is %s: only a sine has cycles",
                            excitation_kind(excitation)->kind.name);
     const double frequency = ((const ExcitationSine *)(const void *)excitation)->frequency;
-    CycleFlowInputs inputs = {.period = 1 / frequency,
-                              .accuracy = simulation_solver(simulation) == &solver_exact
-                                              ? simulation_settings(simulation)
-                                              : NULL,
-                              .steps_max = run_steps_max(limits),
-                              .progress = progress};
-    TRY(run_make_base(simulation, 0, NULL, progress, &inputs.base, problem));
-    TRY(run_make_plan(simulation, progress, &inputs.plan, problem));
-    return cycle_flow_new(&inputs, from, flow, problem);
+    Base base;
+    Plan *plan;
+    const Run run = {.base = &base,
+                     .accuracy = simulation_solver(simulation) == &solver_exact
+                                     ? simulation_settings(simulation)
+                                     : NULL,
+                     .steps_max = run_steps_max(limits),
+                     .progress = progress};
+    TRY(run_make_base(simulation, 0, NULL, progress, &base, problem));
+    TRY(run_make_plan(simulation, progress, &plan, problem));
+    return cycle_flow_new(plan, &run, 1 / frequency, from, flow, problem);
 }

@@ -40,7 +40,7 @@ struct CycleFlow {
     Problem *problem;
     double period; // [s]
     int part;      // of the cycle, at which the section is
-    double *kept;  // q and p
+    double *kept;  // as modal_state_gather
     DamperState *kept_dampers;
     Orbit orbit;
     double *step, *columns, *left, *history, *first;
@@ -102,23 +102,17 @@ static void cycle_flow_scale(CycleFlow *flow) {
 
 void cycle_flow_keep(CycleFlow *flow) {
     const ModalState *state = &flow->engine.state;
-    memcpy(flow->kept, state->q, state->padded * sizeof *flow->kept);
-    memcpy(flow->kept + state->padded, state->p, state->padded * sizeof *flow->kept);
+    modal_state_gather(state, flow->kept);
     memcpy(flow->kept_dampers, state->damper, state->dampers * sizeof *state->damper);
 }
 
 void cycle_flow_restore(CycleFlow *flow, const double *y) {
     ModalState *state = &flow->engine.state;
     const size_t n = state->mode_count, m = state->dampers;
-    memcpy(state->q, flow->kept, state->padded * sizeof *flow->kept);
-    memcpy(state->p, flow->kept + state->padded, state->padded * sizeof *flow->kept);
+    modal_state_scatter(state, y != NULL ? y : flow->kept);
     memcpy(state->damper, flow->kept_dampers, m * sizeof *state->damper);
     modal_state_constrain(state);
-    if (y == NULL)
-        return;
-    memcpy(state->q, y, n * sizeof *y);
-    memcpy(state->p, y + n, n * sizeof *y);
-    for (size_t d = 0; d < m; d++) {
+    for (size_t d = 0; d < m && y != NULL; d++) {
         DamperState *damper = &state->damper[d];
         if (damper->phase == PHASE_RESTING)
             continue;
@@ -137,19 +131,15 @@ static void cycle_flow_clear_resting(const CycleFlow *flow, double *columns, siz
                 columns[i * size + 2 * n + d] = columns[i * size + 2 * n + m + d] = 0;
 }
 
-// To `time` after the zero crossing before.
-static Status cycle_flow_cross(CycleFlow *flow, double time) {
+// Over so many parts of a cycle.
+static Status cycle_flow_cross(CycleFlow *flow, int parts) {
     ModalState *state = &flow->engine.state;
+    state->offset = flow->period * flow->part / PARTS; // after the zero crossing before
     state->events_at_instant = state->chatter_events = 0;
     state->chatter_time = state->suppress_time = state->suppressed_at = 0;
-    TRY(event_engine_cross(&flow->engine, time));
-    TRY(event_engine_check(&flow->engine));
-    state->offset = time;
-    return STATUS_OK;
-}
-
-static double cycle_flow_part_time(const CycleFlow *flow, int part) {
-    return flow->period * part / PARTS;
+    TRY(event_engine_cross(&flow->engine, flow->period * (flow->part + parts) / PARTS));
+    flow->part = (flow->part + parts) % PARTS;
+    return event_engine_check(&flow->engine);
 }
 
 Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t count,
@@ -164,11 +154,8 @@ Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t co
     linearised->peak = 0;
     memset(linearised->squares, 0, state->storey_count * sizeof *linearised->squares);
     Status status = STATUS_OK;
-    const double start = cycle_flow_part_time(flow, flow->part);
-    for (size_t i = 0; i < cycles && status == STATUS_OK; i++) {
-        state->offset = start;
-        status = cycle_flow_cross(flow, start + flow->period);
-    }
+    for (size_t i = 0; i < cycles && status == STATUS_OK; i++)
+        status = cycle_flow_cross(flow, PARTS);
     linearised->count = 0;
     linearised->is_measured = false;
     TRY(status);
@@ -198,12 +185,8 @@ bool cycle_flow_is_flying(const CycleFlow *flow) {
 }
 
 Status cycle_flow_shift(CycleFlow *flow, bool is_home) {
-    for (int i = 0; i < PARTS && (is_home ? flow->part > 0 : !cycle_flow_is_flying(flow)); i++) {
-        flow->engine.state.offset = cycle_flow_part_time(flow, flow->part);
-        flow->part++;
-        TRY(cycle_flow_cross(flow, cycle_flow_part_time(flow, flow->part)));
-        flow->part %= PARTS;
-    }
+    for (int i = 0; i < PARTS && (is_home ? flow->part > 0 : !cycle_flow_is_flying(flow)); i++)
+        TRY(cycle_flow_cross(flow, 1));
     return STATUS_OK;
 }
 
@@ -240,10 +223,6 @@ double cycle_flow_undamped_peak(const CycleFlow *flow) {
         }
     free(A);
     return isfinite(most) ? most : (double)NAN;
-}
-
-double cycle_flow_period(const CycleFlow *flow) {
-    return flow->period;
 }
 
 double cycle_flow_steps(const CycleFlow *flow) {
@@ -300,7 +279,7 @@ static Status cycle_flow_make(CycleFlow *flow, const CycleFlow *from, Problem *p
     const size_t size = flow->orbit.size = flow->linearised.size;
     Orbit *orbit = &flow->orbit;
     const SimdArray arrays[] = {
-        {&flow->kept, 2 * state->padded},
+        {&flow->kept, size},
         {&orbit->scales, size},
         {&orbit->y, size},
         {&orbit->end, size},
@@ -327,27 +306,25 @@ static Status cycle_flow_make(CycleFlow *flow, const CycleFlow *from, Problem *p
     return STATUS_OK;
 }
 
-Status cycle_flow_new(const CycleFlowInputs *inputs, const CycleFlow *from, CycleFlow **made,
-                      Problem *problem) {
+Status cycle_flow_new(Plan *plan, const Run *run, double period, const CycleFlow *from,
+                      CycleFlow **made, Problem *problem) {
     CycleFlow *flow = *made = calloc(1, sizeof *flow);
     if (flow == NULL) {
-        plan_free(inputs->plan);
+        plan_free(plan);
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the motion");
     }
-    flow->plan = inputs->plan;
+    plan->sample_rate = 1 / period;
+    plan->duration = period;
+    plan->count = 2;
+    flow->plan = plan;
     flow->problem = problem;
-    flow->base = inputs->base;
-    flow->period = inputs->period;
-    flow->plan->sample_rate = 1 / inputs->period;
-    flow->plan->duration = inputs->period;
-    flow->plan->count = 2;
+    flow->period = period;
     flow->part = from != NULL ? from->part : 0;
     flow->response.is_unlisted = true;
-    flow->run = (Run){.plan = flow->plan,
-                      .base = &flow->base,
-                      .progress = inputs->progress,
-                      .accuracy = inputs->accuracy,
-                      .steps_max = inputs->steps_max};
+    flow->base = *run->base;
+    flow->run = *run;
+    flow->run.plan = plan;
+    flow->run.base = &flow->base;
     const Status status = cycle_flow_make(flow, from, problem);
     if (status != STATUS_OK) {
         cycle_flow_free(flow);
@@ -583,6 +560,6 @@ Status cycle_flow_wander(CycleFlow *flow, size_t cycles, double *exponent, size_
             cycle_flow_top(flow, &section[i - WARM_UP][0], &section[i - WARM_UP][1]);
     }
     motion->rms_displacement = sqrt(squares / (double)cycles);
-    *exponent = isfinite(sum) ? sum / (double)cycles : (double)NAN;
+    *exponent = isfinite(sum) ? sum / ((double)cycles * flow->period) : (double)NAN;
     return STATUS_OK;
 }

@@ -10,21 +10,14 @@ enum { CYCLE_FLOW_PERIOD = 64 }; // longest of an orbit that is searched for [cy
 
 typedef struct CycleFlow CycleFlow;
 
-// What a flow runs, and how.
-typedef struct CycleFlowInputs {
-    Plan *plan;               // taken, also after a failure
-    Base base;                // borrowed: a sine, or still
-    double period;            // of the sine [s]
-    const Accuracy *accuracy; // of the exact solver, or NULL
-    double steps_max;         // solver steps in all; 0: no limit
-    const Progress *progress; // may be NULL
-} CycleFlowInputs;
-
+// A flow of `plan`, which it takes, also after a failure, over cycles of `period` [s]. Of `run` it
+// uses the base, a sine or still, the settings of the exact solver or NULL, the limit of steps and
+// the progress.
 // Starts from the plan's initial state or, if `from` is not NULL, from the present state of a flow
 // of as many storeys and dampers. Freed by cycle_flow_free; NULL after a failure. The flow borrows
 // `problem`, also for the functions below.
-Status cycle_flow_new(const CycleFlowInputs *inputs, const CycleFlow *from, CycleFlow **flow,
-                      Problem *problem);
+Status cycle_flow_new(Plan *plan, const Run *run, double period, const CycleFlow *from,
+                      CycleFlow **flow, Problem *problem);
 void cycle_flow_free(CycleFlow *flow); // NULL is fine
 
 // An orbit of the flow, or a state from which one is searched for. The state y = (q, p, u, w) has
@@ -77,8 +70,7 @@ void cycle_flow_top(const CycleFlow *flow, double *displacement, double *velocit
 // Largest displacement of any storey in the steady state without dampers; NAN: there is none [m].
 double cycle_flow_undamped_peak(const CycleFlow *flow);
 
-double cycle_flow_period(const CycleFlow *flow); // of the sine [s]
-double cycle_flow_steps(const CycleFlow *flow);  // solver steps so far
+double cycle_flow_steps(const CycleFlow *flow); // solver steps so far
 
 // The scaled return map over `period` cycles from orbit->y, with the contact states that the flow
 // keeps: the end, and its matrix where `has_matrix`. Returns the largest change by the map; NAN: it
@@ -97,7 +89,7 @@ Status cycle_flow_shoot(CycleFlow *flow, size_t period);
 // four times as many more.
 Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period);
 
-// Moves over `cycles` and returns the largest Lyapunov exponent per cycle; NAN: unknown. The
+// Moves over `cycles` and returns the largest Lyapunov exponent [1/s]; NAN: unknown. The
 // displacement and velocity of the top storey after each of the first `points` cycles are written
 // to `section`.
 Status cycle_flow_wander(CycleFlow *flow, size_t cycles, double *exponent, size_t points,

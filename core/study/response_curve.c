@@ -81,7 +81,6 @@ static const Field response_answer_fields[] = {
 // A periodic orbit at which a branch begins.
 typedef struct CurveStart {
     CycleFlow *flow;
-    double value;
     size_t point;
 } CurveStart;
 
@@ -99,7 +98,8 @@ typedef struct CurveWork {
     size_t start_count;
     // Of a continuation; vectors have a number for the value behind the scaled state.
     size_t size; // of the state
-    double *block, *z, *at, *tangent, *by_value, *matrix;
+    double z[CURVE_STATE + 1], at[CURVE_STATE + 1], tangent[CURVE_STATE + 1], by_value[CURVE_STATE];
+    double matrix[(CURVE_STATE + 1) * (CURVE_STATE + 1)];
     size_t unsettled_count;
     char unsettled[256]; // numbers of the first of these points
 } CurveWork;
@@ -263,6 +263,13 @@ static ResponsePoint *curve_add_point(CurveWork *work, double value, int directi
     return point;
 }
 
+static void curve_fill_motion(const CycleMotion *motion, const CycleFlow *flow,
+                              ResponsePoint *point) {
+    point->peak_displacement = motion->peak_displacement;
+    point->rms_displacement = motion->rms_displacement;
+    point->undamped_peak_displacement = cycle_flow_undamped_peak(flow);
+}
+
 // Of the orbit at which the flow is.
 static Status curve_fill_orbit(CycleFlow *flow, size_t period, ResponsePoint *point) {
     const Orbit *orbit = cycle_flow_orbit(flow);
@@ -274,24 +281,18 @@ static Status curve_fill_orbit(CycleFlow *flow, size_t period, ResponsePoint *po
     point->stable = isnan(radius) ? CHOICE_ABSENT : radius < 1 - CURVE_MARGIN;
     for (size_t i = 0; i < orbit->size && !isnan(radius); i++)
         TRY(curve_add_row(orbit->real[i], orbit->imaginary[i], &point->multipliers));
-    point->peak_displacement = motion.peak_displacement;
-    point->rms_displacement = motion.rms_displacement;
-    point->undamped_peak_displacement = cycle_flow_undamped_peak(flow);
+    curve_fill_motion(&motion, flow, point);
     return STATUS_OK;
 }
 
-static Status curve_fill_section(CurveWork *work, CycleFlow *flow, double period,
-                                 ResponsePoint *point) {
+static Status curve_fill_section(CurveWork *work, CycleFlow *flow, ResponsePoint *point) {
     const size_t points = (size_t)work->study->section_points;
-    double(*section)[2] = calloc(points + 1, sizeof *section), exponent;
+    double(*section)[2] = calloc(points + 1, sizeof *section);
     TRY(status_made(section != NULL));
     CycleMotion motion;
-    Status status = cycle_flow_wander(flow, curve_wander_cycles(work->study), &exponent, points,
-                                      section, &motion);
-    point->peak_displacement = motion.peak_displacement;
-    point->rms_displacement = motion.rms_displacement;
-    point->undamped_peak_displacement = cycle_flow_undamped_peak(flow);
-    point->lyapunov = exponent / period;
+    Status status = cycle_flow_wander(flow, curve_wander_cycles(work->study), &point->lyapunov,
+                                      points, section, &motion);
+    curve_fill_motion(&motion, flow, point);
     for (size_t i = 0; i < points && status == STATUS_OK; i++)
         status = curve_add_row(section[i][0], section[i][1], &point->section);
     free(section);
@@ -314,7 +315,6 @@ static Status curve_find_branch(CurveWork *work, CycleFlow *flow, size_t number,
         return STATUS_OK;
     CurveStart *start = &work->starts[work->start_count];
     TRY(curve_make_flow(work, point->value, flow, &start->flow));
-    start->value = point->value;
     start->point = number;
     work->start_count++;
     return STATUS_OK;
@@ -344,7 +344,7 @@ static Status curve_make_point(CurveWork *work, CycleFlow *flow, size_t number) 
     if (!orbit->is_settled)
         curve_note_unsettled(work, number);
     TRY(cycle_flow_shift(flow, true));
-    TRY(curve_fill_section(work, flow, cycle_flow_period(flow), point));
+    TRY(curve_fill_section(work, flow, point));
     return curve_find_branch(work, flow, number, 0);
 }
 
@@ -515,7 +515,7 @@ static Status curve_follow(CurveWork *work, const CurveStart *start, size_t peri
         work->at[i] /= cycle_flow_orbit(start->flow)->scales[i];
         work->tangent[i] = 0;
     }
-    work->at[n] = start->value / span;
+    work->at[n] = work->answer->points.at[start->point].value / span;
     work->tangent[n] = side;
     while (status == STATUS_OK && step >= CURVE_STEP_MIN &&
            work->answer->points.count - first < curve_continued(work->study) / 8 &&
@@ -593,14 +593,6 @@ static Status curve_continue(CurveWork *work, const CurveStart *start) {
 }
 
 static Status curve_continue_all(CurveWork *work) {
-    enum { VECTOR = CURVE_STATE + 1 };
-    work->block = calloc(4 * VECTOR + VECTOR * VECTOR, sizeof *work->block);
-    TRY(status_made(work->block != NULL));
-    work->z = work->block;
-    work->at = work->z + VECTOR;
-    work->tangent = work->at + VECTOR;
-    work->by_value = work->tangent + VECTOR;
-    work->matrix = work->by_value + VECTOR;
     // Short periods first: long ones are many.
     for (size_t period = 1; period <= work->study->max_period; period++)
         for (size_t i = 0; i < work->start_count; i++)
@@ -652,7 +644,6 @@ static void curve_free(void *of) {
     for (size_t i = 0; i < work->start_count; i++)
         cycle_flow_free(work->starts[i].flow);
     cycle_flow_free(work->flow);
-    free(work->block);
 }
 
 const StudyKind study_response = {
