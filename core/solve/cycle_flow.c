@@ -20,7 +20,7 @@
 #include "core/solve/simd_kernels.h"
 
 enum { PARTS = 16 }; // of a cycle, at which the section may be
-enum { NEWTON_STEPS = 12, FIRST_TRY = 4, WARM_UP = 8, PATIENCE = 4 };
+enum { NEWTON_STEPS = 12, FIRST_TRY = 4, WARM_UP = 8, PATIENCE = 2 };
 
 static const double CLOSED = 1e-13; // change by the map at an orbit
 static const double CLOSE = 1e-8;   // a step so small ends at the orbit, but for its square
@@ -499,6 +499,7 @@ Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period) {
     const double patience = PATIENCE * (double)cycles;
     Orbit *orbit = &flow->orbit;
     size_t next = FIRST_TRY, end = cycles;
+    bool is_late = false;
     orbit->period = 0;
     orbit->is_settled = true;
     if (needs_flight)
@@ -513,9 +514,9 @@ Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period) {
             TRY(cycle_flow_try(flow, count, max_period, is_last, &outlook));
             next *= 2;
             if (is_last && orbit->period == 0) {
-                orbit->is_settled = orbit->is_settled && !outlook.has_stable;
-                if (end == cycles && outlook.stay > 0) {
-                    orbit->is_settled = outlook.stay <= patience;
+                orbit->is_settled = !outlook.has_stable && !(is_late && outlook.stay > 0);
+                if (end == cycles) {
+                    is_late = outlook.stay > patience;
                     end += (size_t)ceil(fmin(outlook.stay, patience));
                 }
             }

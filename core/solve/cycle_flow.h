@@ -86,7 +86,7 @@ Status cycle_flow_shoot(CycleFlow *flow, size_t period);
 
 // Moves over at most `cycles` until a periodic motion of at most max_period cycles attracts the
 // flow, and onto that. Near an unstable orbit it goes on for as long as leaving that takes, up to
-// four times as many more.
+// twice as many more.
 Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period);
 
 // Moves over `cycles` and returns the largest Lyapunov exponent [1/s]; NAN: unknown. The

@@ -26,6 +26,7 @@ enum {
     CURVE_EASY = 4,        // corrections up to which the step grows
     CURVE_HARD = 5,        // and beyond which it shrinks
     CURVE_WANDER_MIN = 32, // cycles of a motion without a period
+    CURVE_NAMED = 30,      // points in a warning
 };
 
 static const double CURVE_STEP = 0.02, CURVE_STEP_MIN = 1e-4, CURVE_STEP_MAX = 0.05;
@@ -41,7 +42,7 @@ static const char *const curve_direction_names[] = {"up", "down", "both", NULL};
 static const Field response_study_fields[] = {
     FIELD_ITEM(ResponseStudy, axis, study_axis_fields, NULL, PRESENCE_REQUIRED, "the number that varies: a range of from, to and count; the exact solver is used whatever the scene's solver is"),
     FIELD_CHOICE(ResponseStudy, direction, curve_direction_names, CURVE_UP, "up: from, then on to to, each point from the state of the one before; down: the reverse; both: up, then down"),
-    FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic; fewer where a stable orbit is found earlier, up to five times as many where the motion has not yet left an unstable one"),
+    FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic; fewer where a stable orbit is found earlier, up to three times as many where the motion has not yet left an unstable one"),
     FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CYCLE_FLOW_PERIOD), 8, "longest period searched for, in cycles of the sine"),
     FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits: at most four points for each value of the axis, and 200"),
     FIELD_COUNT(ResponseStudy, section_points, NULL, WITHIN(0, CURVE_SECTION), 64, "points of the section where no periodic orbit is found"),
@@ -323,8 +324,8 @@ static Status curve_find_branch(CurveWork *work, CycleFlow *flow, size_t number,
 static void curve_note_unsettled(CurveWork *work, size_t number) {
     char text[32];
     snprintf(text, sizeof text, "%zu", number);
-    text_list(work->unsettled, sizeof work->unsettled, text);
-    work->unsettled_count++;
+    if (work->unsettled_count++ < CURVE_NAMED)
+        text_list(work->unsettled, sizeof work->unsettled, text);
 }
 
 static Status curve_make_point(CurveWork *work, CycleFlow *flow, size_t number) {
@@ -611,8 +612,9 @@ static Status curve_warn(CurveWork *work) {
     if (work->unsettled_count > 0)
         TRY(warnings_add(&made->warnings, "/study/settle_cycles",
                          "may be too few: beside the motion without a period lies an orbit that is "
-                         "stable, or hardly unstable, at %zu of the points, with index %s",
-                         work->unsettled_count, work->unsettled));
+                         "stable, or hardly unstable, at %zu of the points, with index %s%s",
+                         work->unsettled_count, work->unsettled,
+                         work->unsettled_count > CURVE_NAMED ? " and more" : ""));
     return study_runs_warn(made);
 }
 
