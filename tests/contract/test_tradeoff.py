@@ -13,7 +13,8 @@ import program  # noqa: E402
 SANITIZED = "nightly"
 SPONGE = os.path.join(program.EXAMPLES, "paper_free_sponge.json")
 SVG = "{http://www.w3.org/2000/svg}"
-ERRORS = ["displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement"]
+ERRORS = ["displacement", "mean_acceleration", "peak_force", "impacts", "psd", "rms_displacement",
+          "peak_storey_drift", "peak_base_shear"]
 QUICK = ["--repeats", "1", "--point-steps", "1e6"]
 
 

@@ -1,5 +1,7 @@
 // accuracy.target: what is asked, told, refused and stopped. Whether targets are kept is
 // tests/truth/test_target.c's question.
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -170,6 +172,34 @@ TEST(what_no_double_can_keep_is_marked) {
     assert_true(isnan(outcome->plan.target.estimated_error));
     outcome_unref(outcome);
     simulation_clear(&simulation);
+}
+
+// A frame under a power law: the base's shear is that of the exact run to the target.
+TEST(drift_and_base_shear_are_metrics_of_a_target) {
+#define DRIFTING                                                                                   \
+    "\"structure\": {\"kind\": \"frame\", \"masses\": [100, 80], \"stiffnesses\": [9e4, 7e4]}, "   \
+    "\"dampers\": [{\"mass\": 6, \"clearance\": 0.004, "                                           \
+    "\"buffer\": {\"restitution\": 0.5, \"contact_time\": 0.02}}], "                               \
+    "\"contact\": {\"model\": \"hunt_crossley\"}, "                                                \
+    "\"excitation\": {\"kind\": \"free\", \"displacement\": [0.005, 0.01]}"
+    Outcome *exact = run(DRIFTING ", \"accuracy\": {\"solver\": \"exact\"}");
+    const Summary *should = &exact->summary;
+    static const char *const names[] = {"peak_storey_drift", "peak_base_shear"};
+    const double values[] = {should->peak_storey_drift, should->peak_base_shear};
+    for (size_t i = 0; i < COUNT(names); i++) {
+        char members[1024];
+        snprintf(members, sizeof members,
+                 "%s, \"accuracy\": {\"target\": 1e-3, \"metric\": \"%s\"}", DRIFTING, names[i]);
+        Outcome *outcome = run(members);
+        const Summary *is = &outcome->summary;
+        const double value = i == 0 ? is->peak_storey_drift : is->peak_base_shear;
+        assert_int_equal(outcome->plan.target.metric, METRIC_PEAK_STOREY_DRIFT + (int)i);
+        assert_int_equal(outcome->plan.target.verdict, VERDICT_KEPT);
+        assert_non_null(strstr(outcome->plan.target.way, "tolerance"));
+        assert_true(value != values[i] && fabs(value / values[i] - 1) < 1e-3);
+        outcome_unref(outcome);
+    }
+    outcome_unref(exact);
 }
 
 TEST(a_dry_run_names_the_way) {
