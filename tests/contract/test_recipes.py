@@ -81,7 +81,8 @@ LEFT_OUT = re.compile(r"demo\.sh|run\.sh|^cmake|^ctest|^systemctl|^man |serve|ex
                       r"^curl --json '\{$")
 # Which scene a line is about, where it is not the first one.
 SCENES = {"impactd ensemble": "paper_random_sponge", "impactd study": "compare_sponge", "impactd sweep": "sweep_clearance_buffer",
-          "impactd optimize": "optimize_clearance", "impactd calibrate": "calibrate_free_sponge", "impactd response": "response_sponge"}
+          "impactd optimize": "optimize_clearance", "impactd calibrate": "calibrate_free_sponge", "impactd response": "response_sponge",
+          "impactd fragility": "with_records/fragility"}
 
 
 def lines():
@@ -95,10 +96,11 @@ def lines():
 def test_lines():
     """Every other line of the README for a shell runs, one after the other, each with a scene that fits it."""
     kept = lines()
+    motion = "A title\nof two lines\nin g\nNPTS= 4, DT= .01 SEC\n 0.1 0.2 -0.1 0.05\n"
     assert len(kept) > 25, kept
     with program.daemon("--max-cpu-seconds", "1000") as daemon, tempfile.TemporaryDirectory() as folder:
         with open(os.path.join(folder, "motion.AT2"), "w", encoding="utf-8") as file:
-            file.write("A title\nof two lines\nin g\nNPTS= 4, DT= .01 SEC\n 0.1 0.2 -0.1 0.05\n")
+            file.write(motion)
         with open(os.path.join(folder, "measured.csv"), "w", encoding="utf-8") as file:
             file.write("time [s],acceleration [m/s^2]\n" + "".join(f"{0.001 * i:.3f},{0.1 * (i % 7)}\n" for i in range(40)))
         cork = {"slug": "cork", "name": "Cork", "restitution": 0.4, "contact_time": 0.01, "source": "a guess"}
@@ -114,6 +116,12 @@ def test_lines():
         for line in kept:
             name = next((scene for begin, scene in SCENES.items() if line.startswith(begin)), "paper_free_sponge")
             scene = program.scene(name)
+            records = re.findall(r"--record (\w+)\.AT2", line)
+            if records:
+                scene["study"]["records"] = records
+            for record in records:
+                with open(os.path.join(folder, record + ".AT2"), "w", encoding="utf-8") as file:
+                    file.write(motion)
             with open(os.path.join(folder, "scene.json"), "w", encoding="utf-8") as file:
                 json.dump({**scene, "duration": min(3, scene["duration"])}, file)
             is_end = re.search(r"cancel|jobs/\$JOB$", line)
