@@ -275,7 +275,8 @@ static Status uncertain_input_complete(UncertainInput *input, const Simulation *
         status = study_first_failure(
             status, uncertain_input_check_member(input, i, simulation, own.at, problem));
     }
-    return status == STATUS_OK && input->distribution == INPUT_MATERIAL
+    return status == STATUS_OK && input->distribution == INPUT_MATERIAL &&
+                   study_axis_pointer_count(&input->axis) > 0
                ? uncertain_input_fill(input, simulation, place, problem)
                : status;
 }

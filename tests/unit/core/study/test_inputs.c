@@ -357,6 +357,9 @@ TEST(senseless_inputs_are_refused) {
     add(&inquiry, NULL, INPUT_UNIFORM, 1, 2, 0);
     assert_refused(&inquiry, "/study/inputs/0", "needs a pointer");
     inquiry = make_request(20);
+    add(&inquiry, NULL, INPUT_MATERIAL, 0.1, NAN, 0);
+    assert_refused(&inquiry, "/study/inputs/0", "needs a pointer");
+    inquiry = make_request(20);
     add(&inquiry, "/dampers/0/buffer/restitution", INPUT_UNIFORM, 0.2, 0.8, 0);
     add(&inquiry, "/dampers/0/buffer", INPUT_MATERIAL, 0.1, NAN, 0);
     assert_refused(&inquiry, "/study/inputs/1/pointer", "is also set by entry 0");
