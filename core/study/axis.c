@@ -228,7 +228,7 @@ static Status study_scene_fill_materials(const Buffers *materials, Simulation *t
         Buffer *const sides[] = {&damper->buffer, &damper->left_buffer, &damper->right_buffer};
         Buffer *buffer = sides[i % 3];
         for (size_t k = 0; buffer->material != NULL && k < materials->count; k++)
-            if (strcmp(materials->at[k].material, buffer->material) == 0)
+            if (text_same(materials->at[k].material, buffer->material))
                 TRY(study_scene_fill_material(&materials->at[k], buffer));
     }
     return STATUS_OK;

@@ -550,6 +550,21 @@ static Status names_resolve_axis(NameResolver *names, size_t index) {
     return status;
 }
 
+// A material that came with the study.
+static Status names_resolve_kept_material(NameResolver *names, size_t index) {
+    const Buffers *materials = &names->references.names->materials;
+    Buffer *kept = &materials->at[index];
+    const JsonPointer place = json_pointer_at("/study/materials", index);
+    if (kept->material == NULL)
+        return problem_add(names->problem, STATUS_INVALID, place.at, "must name a material");
+    TRY(resolve_buffer(names->db, kept, place.at, names->warnings, names->problem));
+    for (size_t i = 0; i < index; i++)
+        if (text_same(materials->at[i].material, kept->material))
+            return problem_add(names->problem, STATUS_INVALID, place.at,
+                               "is listed twice, first at /study/materials/%zu", i);
+    return STATUS_OK;
+}
+
 // The records that came with the study.
 static Status names_resolve_records(NameResolver *names) {
     Status status = STATUS_OK;
@@ -571,10 +586,7 @@ static Status names_resolve(NameResolver *names, const Dampers *dampers) {
     const Buffers *materials = references->names != NULL ? &references->names->materials : NULL;
     Status status = STATUS_OK;
     for (size_t i = 0; materials != NULL && i < materials->count; i++)
-        if (!resolve_continues(resolve_buffer(names->db, &materials->at[i],
-                                              json_pointer_at("/study/materials", i).at,
-                                              names->warnings, names->problem),
-                               &status))
+        if (!resolve_continues(names_resolve_kept_material(names, i), &status))
             return status;
     for (size_t i = 0; materials != NULL && i < 3 * dampers->count; i++)
         if (dampers_buffer(dampers, i)->material != NULL)

@@ -386,6 +386,11 @@ def test_a_dry_run_predicts_and_says_what_is_asked():
         assert [m["material"] for m in asked["scene"]["study"]["materials"]] == ["sponge@1", "aluminium@1"]
         same = daemon.request("POST", "/v1/jobs?dry_run=1", json=asked["scene"]).json()
         assert same["result"] == asked["result"] and same["scene"] == asked["scene"]
+        found = errors(daemon, sweep(CLEARANCES, materials=[{"material": "sponge"}, {"restitution": 0.5},
+                                                            {"material": "sponge@1"}]))
+        assert set(found) == {"/study/materials/1", "/study/materials/2"}, found
+        assert "must name a material" in found["/study/materials/1"]["detail"], found
+        assert "listed twice" in found["/study/materials/2"]["detail"], found
 
 
 if __name__ == "__main__":
