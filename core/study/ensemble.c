@@ -277,7 +277,7 @@ typedef struct EnsembleWork {
     StudyWork work;
     const EnsembleStudy *study;
     Ensemble *answer;
-    bool has_force, is_random;
+    bool is_random;
     SpectrumAccumulator sums;
     size_t kept;  // runs whose spectra are kept
     size_t check; // ended runs at the next check of the target
@@ -484,8 +484,6 @@ static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
     Ensemble *answer = work->answer;
     const EnsemblePlace place = ensemble_place(work, member);
     RunRecord *run = &part->run;
-    if (!work->has_force)
-        run->summary.peak_contact_force = (double)NAN;
     TRY(study_runs_add(&answer->made, run, place.seed));
     for (int metric = 0; metric < STATISTICS_METRICS && work->values != NULL; metric++)
         work->values[member * STATISTICS_METRICS + (size_t)metric] =
@@ -596,7 +594,6 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     Ensemble *answer = work->answer = work->work.answer;
     const double densities = study_run_densities(work->work.simulation);
     (void)problem;
-    work->has_force = simulation_has_force(work->work.simulation);
     work->check = STOPPING_RULE_PILOT;
     work->kept = ensemble_kept(study, densities);
     TRY(ensemble_work_make(work, study, work->work.simulation, tools->limits));

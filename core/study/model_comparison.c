@@ -468,6 +468,8 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     TRY(study_copy_reals(reference->spectrum.frequency, densities->rows, &answer->frequency));
     first->steps = reference->steps;
     first->summary = reference->summary;
+    if (!outcome_has_force(reference)) // as in the other entries
+        first->summary.peak_contact_force = (double)NAN;
     TRY(comparison_measure(work, reference, tools->progress, first, problem));
     work->work.members = answer->entries.count - 1;
     work->work.bytes = outcome_bytes(reference);

@@ -167,7 +167,6 @@ typedef struct OptimizeWork {
     size_t results;
     size_t runs, pending; // of a candidate; candidates that may be without results
     RunAggregate aggregate;
-    bool has_force;
     bool is_failed;          // a run of the group
     StudyMetrics *collected; // of the runs of a group
     double *column;          // one metric of them
@@ -553,8 +552,6 @@ static Status optimize_fold(void *of, size_t member, StudyPart *part) {
     TRY(study_runs_add(&work->answer->made, &part->run, member));
     work->is_failed = (work->is_failed && run > 0) || part->run.status != STATUS_OK;
     work->collected[run] = study_metrics_of(&part->run);
-    if (!work->has_force)
-        work->collected[run].peak_contact_force = (double)NAN;
     return run + 1 == work->runs ? optimize_close(work, member / work->runs) : STATUS_OK;
 }
 
@@ -580,7 +577,6 @@ static Status optimize_begin(void *of, const StudyTools *tools, Problem *problem
     work->runs = optimize_runs(study);
     work->aggregate =
         (RunAggregate){study->statistic.of == OPTIMIZE_MAX, study->statistic.quantile};
-    work->has_force = simulation_has_force(work->work.simulation);
     TRY(optimize_search_new(work, problem));
     const size_t candidates = work->search->space.candidates,
                  pending = 1 + (PENDING_RUNS - 1) / work->runs,

@@ -188,6 +188,7 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     if (run->status == STATUS_OK)
         run->status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
                                      &outcome, problem);
+    const bool has_force = run->status == STATUS_OK && simulation_has_force(&scene);
     simulation_clear(&scene);
     if (study_run_ends_study(run->status))
         return study_result(run->status, problem);
@@ -199,6 +200,8 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     Status status = STATUS_OK;
     run->steps = outcome->steps;
     run->summary = outcome->summary;
+    if (!has_force) // no number, else an optimum would prefer contacts without a force
+        run->summary.peak_contact_force = (double)NAN;
     if (outcome->has_reduction)
         run->reduction = outcome->reduction;
     if (kind->keep != NULL)

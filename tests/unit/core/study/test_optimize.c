@@ -249,6 +249,20 @@ TEST(materials_and_maxima_of_a_choice_are_all_tried) {
     end(&request, optimum);
 }
 
+TEST(contacts_without_a_force_do_not_win_by_it) {
+    StudyRequest request = request_make(2);
+    static const char *const models[] = {"\"impulse\"", "\"spring_damper\""};
+    variable_add(&request, "/contact/model", (double)NAN, (double)NAN)->values =
+        texts_of(2, models);
+    study_of(&request)->objectives.at[0].metric = 5; // peak_contact_force
+    complete(&request);
+    Optimum *optimum = run(&request);
+    assert_true(optimum->made.failed == 0 && optimum->best.metrics.peak_contact_force > 0);
+    assert_string_equal(optimum->best.values.at[0].value, models[1]);
+    assert_true(isnan(optimum->undamped.metrics.peak_contact_force));
+    end(&request, optimum);
+}
+
 TEST(constraints_that_none_keeps_are_named_and_the_best_is_absent) {
     StudyRequest request = request_make(20);
     variable_add(&request, "/dampers/0/clearance", 0.005, 0.04);
