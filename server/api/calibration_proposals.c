@@ -14,22 +14,37 @@
 // Of a fitted number from the one before: both a share of it and many standard errors.
 static const double far_share = 0.2, far_errors = 4;
 
-// A fitted parameter of a buffer by its member's name, of damper `damper` (from 1) or, if 0, of the
-// first one that has it; NULL: none.
-static const CalibratedParameter *calibration_find(const Calibration *calibration, uint64_t damper,
-                                                   const char *member) {
+// Whether a fitted parameter is this member of a buffer, of damper `damper` (from 1) or, if 0, of
+// any.
+static bool calibration_is_of(const CalibratedParameter *parameter, uint64_t damper,
+                              const char *member) {
     static const char before[] = "/dampers/";
-    for (size_t i = 0; i < calibration->parameters.count; i++) {
-        const CalibratedParameter *parameter = &calibration->parameters.at[i];
-        const char *name = strrchr(parameter->pointer, '/');
-        if (strncmp(parameter->pointer, before, sizeof before - 1) != 0 ||
-            strstr(parameter->pointer, "buffer/") == NULL || strcmp(name + 1, member) != 0)
+    return strncmp(parameter->pointer, before, sizeof before - 1) == 0 &&
+           strstr(parameter->pointer, "buffer/") != NULL &&
+           strcmp(strrchr(parameter->pointer, '/') + 1, member) == 0 &&
+           (damper == 0 ||
+            strtoull(parameter->pointer + sizeof before - 1, NULL, 10) + 1 == damper);
+}
+
+// The first fitted restitution whose buffer has a fitted contact time too. NULL: none, of both
+// without a restitution.
+static void calibration_find(const Calibration *calibration, uint64_t damper,
+                             const CalibratedParameter **restitution,
+                             const CalibratedParameter **contact_time) {
+    const CalibratedParameters *all = &calibration->parameters;
+    *restitution = *contact_time = NULL;
+    for (size_t i = 0; i < all->count; i++) {
+        const char *own = all->at[i].pointer;
+        if (!calibration_is_of(&all->at[i], damper, "restitution"))
             continue;
-        const uint64_t number = strtoull(parameter->pointer + sizeof before - 1, NULL, 10) + 1;
-        if (damper == 0 || number == damper)
-            return parameter;
+        *restitution = &all->at[i];
+        for (size_t k = 0; k < all->count; k++)
+            if (calibration_is_of(&all->at[k], damper, "contact_time") &&
+                strncmp(all->at[k].pointer, own, (size_t)(strrchr(own, '/') + 1 - own)) == 0) {
+                *contact_time = &all->at[k];
+                return;
+            }
     }
-    return NULL;
 }
 
 // Why there is no proposal; NULL: there is one.
@@ -84,8 +99,8 @@ static Status calibration_compare(const CalibratedParameter *fitted, double head
 static Status calibration_write(const MaterialRevision *head, const ResultRow *row,
                                 const Calibration *calibration, uint64_t damper, Bytes *bytes,
                                 Problem *problem) {
-    const CalibratedParameter *restitution = calibration_find(calibration, damper, "restitution");
-    const CalibratedParameter *contact_time = calibration_find(calibration, damper, "contact_time");
+    const CalibratedParameter *restitution, *contact_time;
+    calibration_find(calibration, damper, &restitution, &contact_time);
     if (restitution == NULL || contact_time == NULL)
         return problem_set(problem, STATUS_CONFLICT,
                            "the calibration did not fit %s of a damper's buffer: a proposal needs "

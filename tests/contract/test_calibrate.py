@@ -43,6 +43,16 @@ def test_a_calibration_becomes_a_revision_of_a_material():
         confirmed = daemon.request("POST", proposal["links"]["confirm"], json=proposal["revision"],
                                    headers={"If-Match": asked.headers["etag"]})
         assert confirmed.status == 201, confirmed
+        # Both numbers of a proposal are of one buffer, also where an earlier one has but one of them.
+        sides = json.loads(json.dumps(scene))
+        ranges = [{key: value for key, value in one.items() if key != "pointer"} for one in scene["study"]["parameters"]]
+        sides["study"]["parameters"] = [{"pointer": f"/dampers/0/{name}", **ranges[at]} for name, at in
+                                        (("left_buffer/restitution", 0), ("right_buffer/contact_time", 1),
+                                         ("right_buffer/restitution", 0))]
+        result = program.finished(daemon, sides)["result"]
+        proposal = daemon.request("POST", f"/v1/results/{result}/calibration/proposal?material=sponge").json()
+        assert "/dampers/0/right_buffer/restitution" in proposal["revision"]["comment"], proposal
+        assert "/dampers/0/right_buffer/contact_time" in proposal["revision"]["comment"], proposal
         other = daemon.get(f"/v1/results/{result}/optimum.json")
         assert other.status == 404 and 'for the study "calibrate", not for "optimize": its answer is calibration.json' in other.json()["detail"], other
         newest = daemon.get("/v1/materials/sponge@2").json()
