@@ -387,11 +387,16 @@ static void calibrate_remove_noise(const CalibrateWork *work, double cost, doubl
 
 static void calibrate_fold_column(CalibrateWork *work, CalibrateStart *start,
                                   const CalibrateRun *run, const CalibratePart *part) {
+    // The mean of the sides whose runs ended; 0 without any.
     double *column = work->columns[run->column];
-    for (size_t i = 0; i < work->rows; i++) {
-        const double slope =
-            part->residual != NULL ? (part->residual[i] - start->residual[i]) / run->step : 0;
-        column[i] = run->is_second ? (column[i] + slope) / 2 : slope;
+    if (!run->is_second) {
+        memset(column, 0, work->rows * sizeof *column);
+        work->sides = 0;
+    }
+    work->sides += part->residual != NULL;
+    for (size_t i = 0; i < work->rows && part->residual != NULL; i++) {
+        const double slope = (part->residual[i] - start->residual[i]) / run->step;
+        column[i] += (slope - column[i]) / work->sides;
     }
     if (run->column + 1 < work->variables || (work->stage != STAGE_FIT && !run->is_second))
         return;
@@ -628,6 +633,7 @@ static Status calibrate_end_search(CalibrateWork *work) {
     if (work->is_over)
         return STATUS_OK;
     work->fit = CALIBRATE_PSD;
+    work->variables = work->parameters; // spectra do not depend on the shift
     work->is_chaotic = true;
     work->explorations = work->window = 0;
     work->windows = 1;
@@ -649,6 +655,15 @@ static Status calibrate_advance(CalibrateWork *work) {
     if (work->stage == STAGE_EXPLORE && !calibrate_is_improved(work))
         return calibrate_end_search(work);
     calibrate_sort_starts(work);
+    if (work->start_count == 0 && work->window > 0) {
+        TRY(calibrate_return(work));
+        const double end = work->limit;
+        work->limit = 0; // the reason is another one
+        return warnings_add(&work->answer->warnings, "/study/measured",
+                            "all runs that went beyond %.3g s failed: only the samples before were "
+                            "fitted",
+                            end);
+    }
     work->is_over = work->start_count == 0;
     if (work->is_over)
         return STATUS_OK;
@@ -667,6 +682,13 @@ static Status calibrate_advance(CalibrateWork *work) {
     return STATUS_OK;
 }
 
+static void calibrate_estimate_runs(CalibrateWork *work) {
+    // Most of them are short.
+    const size_t expected =
+        (size_t)work->study->starts * (130 + 20 * (work->parameters + 1)) + EXPLORED;
+    work->work.expected = work->work.wanted > expected ? work->work.wanted : expected;
+}
+
 static Status calibrate_continue(CalibrateWork *work) {
     StudyWork *study = &work->work;
     work->first = study->wanted;
@@ -677,10 +699,7 @@ static Status calibrate_continue(CalibrateWork *work) {
             calibrate_list_runs(work);
     }
     study->wanted += work->run_count;
-    // Most of them are short.
-    const size_t expected =
-        (size_t)work->study->starts * (130 + 20 * (work->parameters + 1)) + EXPLORED;
-    study->expected = study->wanted > expected ? study->wanted : expected;
+    calibrate_estimate_runs(work);
     return STATUS_OK;
 }
 
@@ -715,11 +734,12 @@ static void calibrate_make_windows(CalibrateWork *work) {
     }
     for (int k = CALIBRATE_WINDOWS - 1; k >= 0; k--) {
         const double share = pow(window_growth, -k);
+        const double end = fmax(from + share * (to - from), from + 2 * work->study->max_shift);
+        const double last = work->windows > 0 ? work->ends[work->windows - 1] : from;
         const bool is_short =
             share * (double)samples < (double)(WINDOW_SAMPLES + 4 * work->variables);
-        if (k == 0 || (work->fit == CALIBRATE_TIME && !is_short))
-            work->ends[work->windows++] =
-                k == 0 ? to : fmax(from + share * (to - from), from + 2 * work->study->max_shift);
+        if (k == 0 || (work->fit == CALIBRATE_TIME && !is_short && end > last && end < to))
+            work->ends[work->windows++] = k == 0 ? to : end;
     }
 }
 
@@ -767,6 +787,7 @@ Status calibrate_begin(void *of, const StudyTools *tools, Problem *problem) {
     calibrate_list_runs(work);
     work->work.members = RUNS_MAX;
     work->work.wanted = work->run_count;
+    calibrate_estimate_runs(work);
     work->work.part_bytes = sizeof(CalibratePart) + rows * sizeof(double);
     work->work.bytes = (starts + work->variables) * rows * sizeof(double);
     return STATUS_OK;

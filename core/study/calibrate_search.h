@@ -115,6 +115,7 @@ typedef struct CalibrateWork {
     CalibrateRun *runs; // the batch
     size_t run_count, first;
     double *columns[CALIBRATE_VARIABLES]; // of the start whose derivatives are folded
+    int sides;                            // that the last of them is the mean of
     uint64_t draws;
     CalibrateResult results[CALIBRATE_WINDOWS];
     CalibratePoints points; // of the window

@@ -95,7 +95,7 @@ static const Field calibration_fields[] = {
     FIELD_CHOICE(Calibration, fit, calibrate_fit_names, OPTIONAL, "what was fitted in the end: time, or psd where the motion cannot be predicted far enough"),
     FIELD_LIST(Calibration, parameters, calibrated_parameter_fields, 0, PRESENCE_DEFAULT, "fitted parameters, in the order of the request"),
     FIELD_ROWS_OR_NULL(Calibration, correlation, NULL, "correlation of the fitted values, in that order"),
-    FIELD_REAL(Calibration, shift, "s", ANY, OPTIONAL, "by which the measured times are moved to later times"),
+    FIELD_REAL(Calibration, shift, "s", ANY, OPTIONAL, "by which the measured times are moved to later times; unknown if spectra are fitted in place of motions"),
     FIELD_REAL(Calibration, shift_error, "s", ANY, OPTIONAL, "standard deviation of the shift, if it was fitted"),
     {.name = "residual_rms", .kind = FIELD_KIND_LIST, .offset = FIELD_LIST_AT(Calibration, residuals), .fields = calibration_residual_fields, .size = sizeof(CalibrationResidual), .presence = PRESENCE_DEFAULT, .doc = "differences between fit and measurement, channel by channel"},
     FIELD_REAL(Calibration, chi_square, NULL, ANY, OPTIONAL, "sum of squared differences over the squared given deviations; unknown without them"),
@@ -415,11 +415,12 @@ static Status calibrate_check_fit(CalibrateWork *work) {
     Calibration *answer = work->answer;
     double chi_square = 0;
     size_t given = 0;
-    for (size_t c = 0; c < work->study->measured.count && answer->detail == NULL; c++) {
+    for (size_t c = 0; c < work->study->measured.count; c++) {
         const MeasuredTarget *target = &work->targets[c];
         const size_t count = target->values.count;
         if (target->is_spectrum || isnan(target->measured->deviation)) {
-            TRY(calibrate_check_channel_fit(work, c));
+            if (answer->detail == NULL)
+                TRY(calibrate_check_channel_fit(work, c));
             continue;
         }
         chi_square += calibrate_sum_squares(work->starts[0].residual + target->place, count);
@@ -528,7 +529,8 @@ static Status calibrate_report_fit(CalibrateWork *work) {
     TRY(calibrate_report_correlation(work));
     for (size_t c = 0; c < work->study->measured.count; c++)
         TRY(calibrate_report_channel(work, c));
-    answer->shift = calibrate_shift(work, work->starts[0].fit.at);
+    const bool has_shift = work->study->max_shift == 0 || work->fit == CALIBRATE_TIME;
+    answer->shift = has_shift ? calibrate_shift(work, work->starts[0].fit.at) : (double)NAN;
     if (work->variables > work->parameters)
         answer->shift_error =
             work->assessment.errors[work->parameters] * 2 * work->study->max_shift;

@@ -160,7 +160,8 @@ Status study_begin(const Variant *study, const Simulation *simulation, const Stu
         status = kind->begin(made, &own, problem);
         if (made->wanted == 0)
             made->wanted = made->members;
-        made->expected = made->members;
+        if (made->expected == 0)
+            made->expected = made->members;
     }
     if (status != STATUS_OK) {
         study_free(made);

@@ -4,8 +4,9 @@
 #include <string.h>
 
 #include "core/base/philox.h"
-#include "core/study/calibrate.h"
+#include "core/study/calibrate_search.h"
 #include "tests/support/fields.h"
+#include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 #include "tests/support/test.h"
 
@@ -71,6 +72,41 @@ static Calibration *calibrate(StudyRequest *request) {
     return (Calibration *)(void *)answer;
 }
 
+typedef bool (*FailingRuns)(const CalibrateWork *work, const CalibrateRun *run);
+
+// The same with some runs that fail.
+static Calibration *calibrate_failing(StudyRequest *request, FailingRuns fails) {
+    const StudyTools tools = {0};
+    Variant *answer = NULL;
+    StudyWork *work = NULL;
+    problem_clear(&problem);
+    assert_int_equal(study_request_complete(request, NULL, NULL, &problem), STATUS_OK);
+    Status status =
+        study_begin(request->study, &request->simulation, &tools, &answer, &work, &problem);
+    assert_true(status == STATUS_OK && work->expected < 1000);
+    const CalibrateWork *search = (const CalibrateWork *)(const void *)work;
+    for (size_t i = 1; i < search->windows; i++)
+        assert_true(search->ends[i] > search->ends[i - 1]);
+    for (size_t i = 0; i < work->wanted && status == STATUS_OK; i++) {
+        StudyPart *part = NULL;
+        status = study_part_make(work, i, &tools, &part, &problem);
+        CalibratePart *made = (CalibratePart *)(void *)part;
+        if (status == STATUS_OK && fails(search, made->run)) {
+            part->run.status = STATUS_UNSTABLE;
+            free(made->residual);
+            made->residual = NULL;
+        }
+        if (status == STATUS_OK)
+            status = study_part_fold(work, i, part, &problem);
+        study_part_free(work, part);
+    }
+    if (status == STATUS_OK)
+        status = study_end(work, &tools, &problem);
+    assert_int_equal(status, STATUS_OK);
+    study_free(work);
+    return (Calibration *)(void *)answer;
+}
+
 static void assert_contains(const CalibratedParameter *parameter, double truth) {
     if (!parameter->is_identifiable || !(parameter->interval_95.at[0] <= truth) ||
         !(truth <= parameter->interval_95.at[1]))
@@ -102,6 +138,56 @@ TEST(restitution_and_contact_time_are_found_in_a_noisy_motion) {
     assert_true(fabs(again->residuals.at[0].deviation / deviation - 1) < 0.1);
     assert_contains(&again->parameters.at[0], 0.61);
     variant_free(&again->variant);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+static bool run_never_fails(const CalibrateWork *work, const CalibrateRun *run) {
+    (void)work;
+    (void)run;
+    return false;
+}
+
+static bool run_fails_behind(const CalibrateWork *work, const CalibrateRun *run) {
+    return work->stage == STAGE_COVARIANCE && run->is_second;
+}
+
+static bool run_fails_beyond_the_first_window(const CalibrateWork *work, const CalibrateRun *run) {
+    (void)run;
+    return work->window > 0;
+}
+
+TEST(runs_that_fail_take_nothing_from_the_others) {
+    StudyRequest request = request_make();
+    measure(&request, &request.simulation, 0.03);
+    study_of(&request)->starts = 1;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    Calibration *whole = calibrate_failing(&request, run_never_fails);
+    Calibration *one_sided = calibrate_failing(&request, run_fails_behind);
+    Calibration *first = calibrate_failing(&request, run_fails_beyond_the_first_window);
+    const double error = whole->parameters.at[0].standard_error;
+    assert_true(one_sided->failed > 0);
+    assert_true(fabs(one_sided->parameters.at[0].standard_error / error - 1) < 0.1);
+    assert_true(first->failed > 0 && first->verdict != CALIBRATE_NOT_EXPLAINED);
+    assert_true(fabs(first->parameters.at[0].value - 865) < 50);
+    assert_non_null(strstr(first->warnings.at[0].detail, "failed"));
+    variant_free(&whole->variant);
+    variant_free(&one_sided->variant);
+    variant_free(&first->variant);
+    study_request_clear(&request);
+}
+
+TEST(chi_square_is_of_all_channels_with_a_given_deviation) {
+    StudyRequest request = request_make();
+    measure(&request, &request.simulation, 0.02)->deviation = (double)NAN;
+    measure(&request, &request.simulation, 0.02);
+    request.simulation.scene.dampers.at[0].clearance = 1; // explains neither
+    study_of(&request)->starts = 1;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    Calibration *answer = calibrate(&request);
+    assert_int_equal(answer->verdict, CALIBRATE_NOT_EXPLAINED);
+    assert_int_equal(answer->freedom, answer->residuals.at[1].samples - 1);
+    assert_true(answer->chi_square > 2 * (double)answer->freedom);
     variant_free(&answer->variant);
     study_request_clear(&request);
 }
@@ -186,6 +272,24 @@ TEST(a_chaotic_motion_is_fitted_by_its_spectrum_with_an_interval_that_allows_for
     assert_contains(&answer->parameters.at[0], 865);
     assert_non_null(strstr(answer->warnings.at[0].detail, "cannot be predicted to the end"));
     assert_true(answer->parameters.at[0].standard_error > 0.1);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+TEST(spectra_that_are_fitted_in_place_of_motions_give_no_shift) {
+    StudyRequest request = request_make();
+    paper_sine(&request.simulation, 1, 4.85);
+    request.simulation.scene.duration = 30;
+    measure(&request, &request.simulation, 0.3)->samples.count -= 20;
+    study_of(&request)->max_shift = 0.5;
+    study_of(&request)->starts = 1;
+    request.simulation.output.psd.segment = 512;
+    parameter_add(&request, "/dampers/0/buffer/restitution", 0.61 - 1e-9, 0.61 + 1e-9);
+    Calibration *answer = calibrate_failing(&request, run_never_fails);
+    assert_int_equal(answer->fit, CALIBRATE_PSD);
+    assert_true(isnan(answer->shift) && isnan(answer->shift_error));
+    for (size_t i = 0; i < answer->history.count; i++)
+        assert_true(isfinite(answer->history.at[i].cost));
     variant_free(&answer->variant);
     study_request_clear(&request);
 }
