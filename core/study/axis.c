@@ -367,6 +367,31 @@ Status study_scene_make(const Simulation *base, const StudyAxes *axes, const Stu
     return simulation_complete(target, limits, NULL, problem);
 }
 
+Status study_axes_check_value(const StudyAxes *axes, size_t number, size_t index,
+                              const Simulation *simulation, const StudyNames *names,
+                              const SimulationLimits *limits, const char *place, Problem *scratch,
+                              Problem *problem) {
+    const StudyAxis *axis = &axes->at[number];
+    const JsonPointer own = json_pointer_at(place, number);
+    const bool is_range = study_axis_is_range(axis);
+    const JsonPointer at = is_range ? json_pointer_of(own.at, index == 0 ? "from" : "to")
+                                    : json_pointer_at(json_pointer_of(own.at, "values").at, index);
+    StudyValue values[STUDY_AXES];
+    Simulation scene;
+    for (size_t i = 0; i < axes->count; i++)
+        values[i] = (StudyValue){NULL, (double)NAN};
+    values[number] = is_range ? (StudyValue){NULL, index == 0 ? axis->from : axis->to}
+                              : study_axis_value(axis, index);
+    problem_clear(scratch);
+    const Status status =
+        study_scene_make(simulation, axes, values, names, true, limits, &scene, scratch);
+    simulation_clear(&scene);
+    return status == STATUS_INVALID
+               ? problem_add(problem, status, at.at, "gives a scene that is not valid: %s: %s",
+                             scratch->faults[0].pointer, scratch->faults[0].detail)
+               : status;
+}
+
 Status study_scene_use_record(Simulation *scene, const PinnedRecord *pinned) {
     Variant **excitation = &scene->scene.excitation;
     if (*excitation == NULL || (*excitation)->kind != &excitation_record.kind) {

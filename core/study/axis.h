@@ -105,6 +105,13 @@ bool study_field_is_real(const Field *field, bool is_tag);
 Status study_axes_find(const StudyAxes *axes, const Simulation *simulation, const char *place,
                        const Field **rows, bool *are_tags, Problem *problem);
 
+// That value `index` of one axis alone, or end 0 or 1 of its range, gives a valid scene; the axes
+// are at `place`. `scratch` is for the scene's faults.
+Status study_axes_check_value(const StudyAxes *axes, size_t axis, size_t index,
+                              const Simulation *simulation, const StudyNames *names,
+                              const SimulationLimits *limits, const char *place, Problem *scratch,
+                              Problem *problem);
+
 // The completed scene with a value for each axis, set in their order. `is_bare`: without output.
 // `names` may be NULL. Cleared by simulation_clear in any case. Faults have the pointers of the
 // scene.

@@ -49,8 +49,7 @@ extern const char *const calibrate_verdict_names[];
 
 // A fitted parameter. NAN and empty: unknown.
 typedef struct CalibratedParameter {
-    char *pointer;  // the first of its pointers
-    Texts pointers; // if it has several
+    StudyMember member;
     char *unit;
     double value, standard_error;
     Reals interval_95;
@@ -104,7 +103,7 @@ typedef struct CalibrationSteps {
 // The answer.
 typedef struct Calibration {
     Variant variant;
-    uint64_t runs, failed;
+    StudyRuns made;
     int fit; // CalibrateFit that was used
     CalibratedParameters parameters;
     Rows correlation;
@@ -116,10 +115,6 @@ typedef struct Calibration {
     char *detail;
     CalibrationMotions motions;
     CalibrationSteps history;
-    StudyFailures failures;
-    Warnings warnings;
 } Calibration;
-
-extern const Field calibrated_parameter_fields[];
 
 #endif

@@ -62,6 +62,8 @@ static const double enough = 0.2; // half width of an interval of the window bef
 static const double undetermined = 0.5; // half width of an interval, of the range
 static const double rival = 0.25;       // of the range: a valley this far away that fits as well
 
+static const double calibrate_quantile_95 = 1.645; // of the normal distribution, one-sided
+
 // --- Measured motions ---
 
 double measured_rms(const MeasuredChannel *measured) {
@@ -659,7 +661,7 @@ static Status calibrate_advance(CalibrateWork *work) {
         TRY(calibrate_return(work));
         const double end = work->limit;
         work->limit = 0; // the reason is another one
-        return warnings_add(&work->answer->warnings, "/study/measured",
+        return warnings_add(&work->answer->made.warnings, "/study/measured",
                             "all runs that went beyond %.3g s failed: only the samples before were "
                             "fitted",
                             end);
@@ -705,14 +707,8 @@ static Status calibrate_continue(CalibrateWork *work) {
 
 Status calibrate_fold(void *of, size_t member, StudyPart *part) {
     CalibrateWork *work = of;
-    Calibration *answer = work->answer;
     const CalibrateRun *run = &work->runs[member - work->first];
-    answer->runs++;
-    if (part->run.status != STATUS_OK) {
-        answer->failed++;
-        TRY(study_failures_add(&answer->failures, (int)part->run.status,
-                               status_slug(part->run.status), member, part->run.why));
-    }
+    TRY(study_runs_add(&work->answer->made, &part->run, member));
     if (run->step != 0)
         calibrate_fold_column(work, &work->starts[run->start], run,
                               (const CalibratePart *)(const void *)part);
@@ -744,14 +740,13 @@ static void calibrate_make_windows(CalibrateWork *work) {
 }
 
 // The points of the first screen: a Sobol sequence, and the middle as the first.
-static Status calibrate_place_starts(CalibrateWork *work) {
+static void calibrate_place_starts(CalibrateWork *work) {
     const Sampling sampling = {SAMPLING_SOBOL, work->study->search_seed, work->start_count};
     for (size_t k = 0; k < work->start_count; k++) {
         work->starts[k].number = k;
         for (size_t i = 0; i < work->variables; i++)
             work->starts[k].fit.at[i] = k == 0 ? 0.5 : sampling_coordinate(&sampling, k, i);
     }
-    return STATUS_OK;
 }
 
 Status calibrate_begin(void *of, const StudyTools *tools, Problem *problem) {
@@ -782,7 +777,7 @@ Status calibrate_begin(void *of, const StudyTools *tools, Problem *problem) {
     for (size_t i = 0; i < work->variables; i++)
         TRY(status_made((work->columns[i] = calloc(rows + 1, sizeof(double))) != NULL));
     calibrate_make_windows(work);
-    TRY(calibrate_place_starts(work));
+    calibrate_place_starts(work);
     TRY(calibrate_open(work, STAGE_SCREEN));
     calibrate_list_runs(work);
     work->work.members = RUNS_MAX;

@@ -13,7 +13,7 @@ enum {
     CALIBRATE_KEPT = 3,     // starts of the result of a window
 };
 
-static const double calibrate_quantile_95 = 1.645, calibrate_quantile_999 = 3.09; // one-sided
+static const double calibrate_quantile_999 = 3.09; // of the normal distribution, one-sided
 
 // The part of a measured channel that is compared. The measured channel is borrowed.
 typedef struct MeasuredTarget {

@@ -30,7 +30,7 @@ static const Field measured_channel_fields[] = {
 };
 
 static const Field calibrate_study_fields[] = {
-    FIELD_LIST(CalibrateStudy, parameters, study_variable_fields, CALIBRATE_PARAMETERS, PRESENCE_REQUIRED, "numbers of the scene to be fitted, each within a range from ... to"),
+    FIELD_LIST(CalibrateStudy, parameters, study_range_fields, CALIBRATE_PARAMETERS, PRESENCE_REQUIRED, "numbers of the scene to be fitted, each within a range from ... to"),
     FIELD_LIST(CalibrateStudy, measured, measured_channel_fields, MEASURED_CHANNELS, PRESENCE_REQUIRED, "measured motions"),
     FIELD_CHOICE(CalibrateStudy, fit, calibrate_fit_names, CALIBRATE_TIME, "time: sample by sample; psd: spectra by Welch's method with the settings of output.psd"),
     FIELD_REAL(CalibrateStudy, max_shift, "s", AT_MIN(0), 0, "the measured times may be wrong by a common shift of at most this, which is fitted too"),
@@ -40,9 +40,8 @@ static const Field calibrate_study_fields[] = {
     FIELD_END
 };
 
-const Field calibrated_parameter_fields[] = {
-    FIELD_TEXT(CalibratedParameter, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member"),
-    FIELD_TEXTS(CalibratedParameter, pointers, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "tied members, if there are several"),
+static const Field calibrated_parameter_fields[] = {
+    FIELD_BASE(CalibratedParameter, member, study_member_fields),
     FIELD_TEXT(CalibratedParameter, unit, 0, PRESENCE_OPTIONAL, 0, "of its value"),
     FIELD_REAL(CalibratedParameter, value, NULL, ANY, OPTIONAL, "fitted"),
     FIELD_REAL(CalibratedParameter, standard_error, NULL, ANY, OPTIONAL, "standard deviation of the fitted value; unknown if it is not identifiable"),
@@ -81,17 +80,8 @@ static const Field calibration_step_fields[] = {
     FIELD_END
 };
 
-static const Field calibration_failure_fields[] = {
-    FIELD_TEXT(StudyFailure, reason, 0, PRESENCE_OPTIONAL, 0, "reason"),
-    FIELD_COUNT(StudyFailure, count, NULL, AT_MIN(1), 0, "runs that failed for this reason"),
-    {.name = "first_run", .kind = FIELD_KIND_COUNT, .offset = FIELD_AT(StudyFailure, first, uint64_t), .range = AT_MIN(0), .presence = PRESENCE_OPTIONAL, .doc = "the first of them"},
-    FIELD_TEXT(StudyFailure, detail, 0, PRESENCE_OPTIONAL, 0, "reason of the first of them"),
-    FIELD_END
-};
-
 static const Field calibration_fields[] = {
-    FIELD_COUNT(Calibration, runs, NULL, AT_MIN(0), 0, "runs made"),
-    FIELD_COUNT(Calibration, failed, NULL, AT_MIN(0), 0, "runs that failed"),
+    FIELD_BASE(Calibration, made, study_runs_fields),
     FIELD_CHOICE(Calibration, fit, calibrate_fit_names, OPTIONAL, "what was fitted in the end: time, or psd where the motion cannot be predicted far enough"),
     FIELD_LIST(Calibration, parameters, calibrated_parameter_fields, 0, PRESENCE_DEFAULT, "fitted parameters, in the order of the request"),
     FIELD_ROWS_OR_NULL(Calibration, correlation, NULL, "correlation of the fitted values, in that order"),
@@ -104,8 +94,6 @@ static const Field calibration_fields[] = {
     FIELD_TEXT(Calibration, detail, 0, PRESENCE_OPTIONAL, 0, "the verdict in words"),
     FIELD_LIST(Calibration, motions, calibration_motion_fields, 0, PRESENCE_DEFAULT, "each measured channel and the same of the fitted scene, at most 1000 points of them"),
     FIELD_LIST(Calibration, history, calibration_step_fields, 0, PRESENCE_DEFAULT, "steps of the search"),
-    FIELD_LIST(Calibration, failures, calibration_failure_fields, 0, PRESENCE_DEFAULT, "runs that failed, by their reason"),
-    FIELD_LIST(Calibration, warnings, warning_fields, 0, PRESENCE_DEFAULT, "doubts"),
     FIELD_END
 };
 // clang-format on
@@ -183,61 +171,32 @@ static Status calibrate_check_measured(const CalibrateStudy *study, const Simula
     return status;
 }
 
-// That a parameter is a real number, and each end of its range possible in the scene as it is.
-static Status calibrate_check_parameter(const CalibrateStudy *study, const Simulation *simulation,
-                                        const SimulationLimits *limits, size_t i, Simulation *copy,
-                                        Problem *own, Problem *problem) {
-    const StudyAxes *axes = &study->parameters;
-    const JsonPointer place = json_pointer_at("/study/parameters", i);
-    bool is_tag = false;
-    const Field *row = study_axis_find(&axes->at[i], copy, &is_tag, place.at, problem);
-    if (row == NULL)
-        return STATUS_INVALID;
-    if (is_tag || (row->kind != FIELD_KIND_REAL && row->kind != FIELD_KIND_REALS &&
-                   row->kind != FIELD_KIND_ROWS))
-        return problem_add(problem, STATUS_INVALID, place.at, "%s is not a real number",
-                           study_axis_pointer(&axes->at[i], 0));
-    Status status = STATUS_OK;
-    for (int end = 0; end < 2; end++) {
-        StudyValue values[CALIBRATE_PARAMETERS];
-        Simulation scene = {0};
-        for (size_t k = 0; k < axes->count; k++)
-            values[k] =
-                (StudyValue){NULL, k == i ? calibrate_value(&axes->at[i], end) : (double)NAN};
-        problem_clear(own);
-        const Status made =
-            study_scene_make(simulation, axes, values, &study->names, true, limits, &scene, own);
-        simulation_clear(&scene);
-        status = study_first_failure(
-            status, made == STATUS_INVALID
-                        ? json_pointer_fault(problem, place.at, end == 0 ? "from" : "to",
-                                             "gives a scene that is not valid: %s: %s",
-                                             own->faults[0].pointer, own->faults[0].detail)
-                        : made);
-    }
-    return status;
-}
-
+// That each parameter is a real number, and each end of its range possible in the scene as it is.
 static Status calibrate_check_parameters(const CalibrateStudy *study, const Simulation *simulation,
                                          const SimulationLimits *limits, Problem *own,
                                          Problem *problem) {
     static const char place[] = "/study/parameters";
     const StudyAxes *axes = &study->parameters;
-    Status status = study_axes_check(axes, false, place, problem);
+    const Field *rows[CALIBRATE_PARAMETERS];
+    bool are_tags[CALIBRATE_PARAMETERS];
     if (axes->count == 0)
-        status =
-            problem_add(problem, STATUS_INVALID, place, "must have at least one parameter to fit");
-    for (size_t i = 0; i < axes->count; i++)
-        if (axes->at[i].values.count > 0)
-            status = json_pointer_fault(problem, json_pointer_at(place, i).at, "values",
-                                        "cannot be fitted: give a range, from and to");
-    TRY(status);
-    Simulation copy = {0};
-    status = fields_copy(simulation_fields, simulation, &copy);
-    for (size_t i = 0; i < axes->count && status != STATUS_NO_MEMORY; i++)
-        status = study_first_failure(
-            status, calibrate_check_parameter(study, simulation, limits, i, &copy, own, problem));
-    simulation_clear(&copy);
+        return problem_add(problem, STATUS_INVALID, place,
+                           "must have at least one parameter to fit");
+    TRY(study_axes_check(axes, false, place, problem));
+    Status status = study_axes_find(axes, simulation, place, rows, are_tags, problem);
+    for (size_t i = 0; i < axes->count && status != STATUS_NO_MEMORY; i++) {
+        if (rows[i] == NULL)
+            continue;
+        if (!study_field_is_real(rows[i], are_tags[i])) {
+            status = problem_add(problem, STATUS_INVALID, json_pointer_at(place, i).at,
+                                 "%s is not a real number", study_axis_pointer(&axes->at[i], 0));
+            continue;
+        }
+        for (size_t end = 0; end < 2; end++)
+            status = study_first_failure(status, study_axes_check_value(axes, i, end, simulation,
+                                                                        &study->names, limits,
+                                                                        place, own, problem));
+    }
     return status;
 }
 
@@ -281,18 +240,14 @@ static const char *calibrate_pointer(const CalibrateWork *work, size_t i) {
 }
 
 // The errors are those of noise: there are none if the model does not explain the motions.
-static Status calibrate_report_parameter(CalibrateWork *work, size_t i, Simulation *scene) {
+static Status calibrate_report_parameter(CalibrateWork *work, size_t i, const char *unit) {
     const StudyAxis *axis = &work->study->parameters.at[i];
     const CalibrateAssessment *found = &work->assessment;
     CalibratedParameter *parameter = list_append(&work->answer->parameters, sizeof *parameter);
     TRY(status_made(parameter != NULL));
     parameter->value = parameter->standard_error = (double)NAN;
-    TRY(text_copy(calibrate_pointer(work, i), &parameter->pointer));
-    for (size_t k = 0; k < axis->pointers.count; k++)
-        TRY(texts_append(&parameter->pointers, axis->pointers.at[k]));
-    bool is_tag = false;
-    const Field *row = study_axis_find(axis, scene, &is_tag, "", NULL);
-    TRY(text_copy(row != NULL ? row->unit : NULL, &parameter->unit));
+    TRY(study_axis_member(axis, &parameter->member));
+    TRY(text_copy(unit, &parameter->unit));
     if (work->start_count == 0)
         return STATUS_OK;
     parameter->value = calibrate_value(axis, work->starts[0].fit.at[i]);
@@ -404,7 +359,7 @@ static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
             "the differences of %s from the best fit, %.2g %s rms or %.2g %% of the motion, are "
             "correlated in time, which noise is not",
             name, rms, unit, 100 * rms / motion));
-    return warnings_add(&answer->warnings, json_pointer_at("/study/measured", c).at,
+    return warnings_add(&answer->made.warnings, json_pointer_at("/study/measured", c).at,
                         "the differences of %s from the fit, %.2g %s rms, are correlated in time: "
                         "the true intervals are wider than those given",
                         name, rms, unit);
@@ -493,7 +448,7 @@ static Status calibrate_report_verdict(CalibrateWork *work) {
 }
 
 static Status calibrate_warn(CalibrateWork *work) {
-    Warnings *warnings = &work->answer->warnings;
+    Warnings *warnings = &work->answer->made.warnings;
     const double *at = work->starts[0].fit.at;
     if (work->limit > 0)
         TRY(warnings_add(
@@ -524,7 +479,7 @@ static Status calibrate_report_fit(CalibrateWork *work) {
     if (work->start_count == 0) {
         answer->verdict = CALIBRATE_NOT_EXPLAINED;
         return status_made(text_format(&answer->detail, "none of the %llu runs ended: see failures",
-                                       (unsigned long long)answer->runs));
+                                       (unsigned long long)answer->made.runs));
     }
     TRY(calibrate_report_correlation(work));
     for (size_t c = 0; c < work->study->measured.count; c++)
@@ -540,17 +495,16 @@ static Status calibrate_report_fit(CalibrateWork *work) {
 
 static Status calibrate_end(void *of, const StudyTools *tools, Problem *problem) {
     CalibrateWork *work = of;
-    Simulation scene = {0};
+    const Field *rows[CALIBRATE_PARAMETERS];
+    bool are_tags[CALIBRATE_PARAMETERS];
     (void)tools;
-    (void)problem;
     work->answer->fit = work->fit;
-    Status status = calibrate_report_fit(work);
-    if (status == STATUS_OK)
-        status = fields_copy(simulation_fields, work->work.simulation, &scene);
-    for (size_t i = 0; i < work->parameters && status == STATUS_OK; i++)
-        status = calibrate_report_parameter(work, i, &scene);
-    simulation_clear(&scene);
-    return status;
+    TRY(study_axes_find(&work->study->parameters, work->work.simulation, "/study/parameters", rows,
+                        are_tags, problem));
+    TRY(calibrate_report_fit(work));
+    for (size_t i = 0; i < work->parameters; i++)
+        TRY(calibrate_report_parameter(work, i, rows[i]->unit));
+    return STATUS_OK;
 }
 
 static Status calibrate_solution(const void *request, const Variant *answer, StudyValue *values,

@@ -401,29 +401,7 @@ static Status optimize_complete_over(OptimizeStudy *study, const Simulation *sim
     return status;
 }
 
-// Where end or value `index` of one variable alone, in the given scene, makes an invalid scene.
-static Status optimize_check_value(const OptimizeStudy *study, const Simulation *simulation,
-                                   size_t variable, size_t index, const SimulationLimits *limits,
-                                   Problem *scratch, Problem *problem) {
-    const StudyAxis *axis = &study->variables.at[variable];
-    const JsonPointer own = json_pointer_at("/study/variables", variable);
-    const bool is_range = study_axis_is_range(axis);
-    const JsonPointer place = is_range
-                                  ? json_pointer_of(own.at, index == 0 ? "from" : "to")
-                                  : json_pointer_at(json_pointer_of(own.at, "values").at, index);
-    StudyValue values[SEARCH_VARIABLES];
-    Simulation scene;
-    optimize_values(&(OptimizeWork){.study = study}, 0, values);
-    values[variable] = is_range ? (StudyValue){NULL, index == 0 ? axis->from : axis->to}
-                                : study_axis_value(axis, index);
-    problem_clear(scratch);
-    const Status status = study_scene_make(simulation, &study->variables, values, &study->names,
-                                           true, limits, &scene, scratch);
-    simulation_clear(&scene);
-    return status == STATUS_INVALID ? problem_add(problem, status, place.at, "%s", scratch->detail)
-                                    : status;
-}
-
+// That each end or value of one variable alone, in the given scene, makes a valid scene.
 static Status optimize_check_values(const OptimizeStudy *study, const Simulation *simulation,
                                     const SimulationLimits *limits, Problem *problem) {
     Problem *scratch = malloc(sizeof *scratch);
@@ -435,7 +413,8 @@ static Status optimize_check_values(const OptimizeStudy *study, const Simulation
         const size_t count = study_axis_is_range(axis) ? 2 : values;
         for (size_t k = 0; k < count && (status == STATUS_OK || status == STATUS_INVALID); k++)
             status = study_first_failure(
-                status, optimize_check_value(study, simulation, i, k, limits, scratch, problem));
+                status, study_axes_check_value(&study->variables, i, k, simulation, &study->names,
+                                               limits, "/study/variables", scratch, problem));
     }
     free(scratch);
     return status;

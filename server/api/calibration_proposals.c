@@ -19,11 +19,11 @@ static const double far_share = 0.2, far_errors = 4;
 static bool calibration_is_of(const CalibratedParameter *parameter, uint64_t damper,
                               const char *member) {
     static const char before[] = "/dampers/";
-    return strncmp(parameter->pointer, before, sizeof before - 1) == 0 &&
-           strstr(parameter->pointer, "buffer/") != NULL &&
-           strcmp(strrchr(parameter->pointer, '/') + 1, member) == 0 &&
+    return strncmp(parameter->member.pointer, before, sizeof before - 1) == 0 &&
+           strstr(parameter->member.pointer, "buffer/") != NULL &&
+           strcmp(strrchr(parameter->member.pointer, '/') + 1, member) == 0 &&
            (damper == 0 ||
-            strtoull(parameter->pointer + sizeof before - 1, NULL, 10) + 1 == damper);
+            strtoull(parameter->member.pointer + sizeof before - 1, NULL, 10) + 1 == damper);
 }
 
 // The first fitted restitution whose buffer has a fitted contact time too. NULL: none, of both
@@ -34,13 +34,14 @@ static void calibration_find(const Calibration *calibration, uint64_t damper,
     const CalibratedParameters *all = &calibration->parameters;
     *restitution = *contact_time = NULL;
     for (size_t i = 0; i < all->count; i++) {
-        const char *own = all->at[i].pointer;
+        const char *own = all->at[i].member.pointer;
         if (!calibration_is_of(&all->at[i], damper, "restitution"))
             continue;
         *restitution = &all->at[i];
         for (size_t k = 0; k < all->count; k++)
             if (calibration_is_of(&all->at[k], damper, "contact_time") &&
-                strncmp(all->at[k].pointer, own, (size_t)(strrchr(own, '/') + 1 - own)) == 0) {
+                strncmp(all->at[k].member.pointer, own, (size_t)(strrchr(own, '/') + 1 - own)) ==
+                    0) {
                 *contact_time = &all->at[k];
                 return;
             }
@@ -93,7 +94,7 @@ static Status calibration_compare(const CalibratedParameter *fitted, double head
     return warnings_add(warnings, pointer,
                         "%.4g, fitted to %s, is far from that of the latest revision, %.4g: is "
                         "the buffer of the scene made of this material?",
-                        fitted->value, fitted->pointer, head);
+                        fitted->value, fitted->member.pointer, head);
 }
 
 static Status calibration_write(const MaterialRevision *head, const ResultRow *row,
@@ -121,7 +122,7 @@ static Status calibration_write(const MaterialRevision *head, const ResultRow *r
         bytes_json(bytes,
                    ", \"comment\": \"%s %g, %s %g s, fitted for the masses of the scene of "
                    "calibration %s\"}",
-                   restitution->pointer, restitution->value, contact_time->pointer,
+                   restitution->member.pointer, restitution->value, contact_time->member.pointer,
                    contact_time->value, row->id);
         fields_clear(material_fields, &material);
         status = status_first(

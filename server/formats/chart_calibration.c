@@ -13,11 +13,11 @@ static const char *calibration_parameter_text(Chart *chart, const CalibratedPara
     const char *unit = parameter->unit != NULL ? parameter->unit : "";
     const char *space = unit[0] != '\0' ? " " : "";
     if (isnan(parameter->value))
-        return chart_text(chart, "%.80s is unknown", parameter->pointer);
+        return chart_text(chart, "%.80s is unknown", parameter->member.pointer);
     if (interval->count != 2 || !parameter->is_identifiable)
-        return chart_text(chart, "%.80s = %.4g%s%s%s", parameter->pointer, parameter->value, space,
-                          unit, parameter->is_identifiable ? "" : " (not determined)");
-    return chart_text(chart, "%.80s = %.4g%s%s (%.4g to %.4g)", parameter->pointer,
+        return chart_text(chart, "%.80s = %.4g%s%s%s", parameter->member.pointer, parameter->value,
+                          space, unit, parameter->is_identifiable ? "" : " (not determined)");
+    return chart_text(chart, "%.80s = %.4g%s%s (%.4g to %.4g)", parameter->member.pointer,
                       parameter->value, space, unit, interval->at[0], interval->at[1]);
 }
 
@@ -83,7 +83,7 @@ void calibration_table(const Variant *answer, StudyTable *table) {
         const Reals *interval = &parameter->interval_95;
         const bool has_interval = interval->count == 2;
         study_table_row(table);
-        study_table_text(table, "pointer", parameter->pointer);
+        study_table_text(table, "pointer", parameter->member.pointer);
         study_table_text(table, "unit", parameter->unit != NULL ? parameter->unit : "1");
         study_table_number(table, "value", NULL, parameter->value);
         study_table_number(table, "standard_error", NULL, parameter->standard_error);

@@ -350,7 +350,7 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
         fail_msg("%llu: %s %s", (unsigned long long)number, status_slug(status), problem.detail);
     Tally *tally = &tallies[kind];
     const Calibration *answer = (const Calibration *)(const void *)made;
-    tally->runs += (double)answer->runs;
+    tally->runs += (double)answer->made.runs;
     if (number % TIMED == 0)
         runs_time(&request, tally);
     tally->trials++;
@@ -398,11 +398,11 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
         printf("%llu kind %d noise %.3f widest %.3g cost %.5g, of the truth %.5g, runs %llu: %s: "
                "%s%s\n",
                (unsigned long long)number, kind, noise, widest, fit_cost, true_cost,
-               (unsigned long long)answer->runs, calibrate_verdict_names[answer->verdict],
+               (unsigned long long)answer->made.runs, calibrate_verdict_names[answer->verdict],
                answer->detail, is_lost ? " LOST" : "");
     if (getenv("CALIBRATE_VERBOSE") != NULL)
-        for (size_t i = 0; i < answer->warnings.count; i++)
-            printf("   %s\n", answer->warnings.at[i].detail);
+        for (size_t i = 0; i < answer->made.warnings.count; i++)
+            printf("   %s\n", answer->made.warnings.at[i].detail);
     if (getenv("CALIBRATE_HISTORY") != NULL)
         for (size_t i = 0; i < answer->history.count; i++) {
             const CalibrationStep *step = &answer->history.at[i];

@@ -110,7 +110,7 @@ static Calibration *calibrate_failing(StudyRequest *request, FailingRuns fails) 
 static void assert_contains(const CalibratedParameter *parameter, double truth) {
     if (!parameter->is_identifiable || !(parameter->interval_95.at[0] <= truth) ||
         !(truth <= parameter->interval_95.at[1]))
-        fail_msg("%s: %g +- %g, true %g", parameter->pointer, parameter->value,
+        fail_msg("%s: %g +- %g, true %g", parameter->member.pointer, parameter->value,
                  parameter->standard_error, truth);
 }
 
@@ -125,7 +125,7 @@ TEST(restitution_and_contact_time_are_found_in_a_noisy_motion) {
     assert_contains(&answer->parameters.at[0], 0.61);
     assert_contains(&answer->parameters.at[1], 0.025);
     assert_true(answer->parameters.at[0].standard_error < 0.02);
-    assert_true(answer->failed == 0 && answer->runs > 50 && answer->history.count > 4);
+    assert_true(answer->made.failed == 0 && answer->made.runs > 50 && answer->history.count > 4);
     assert_true(fabs(answer->chi_square / (double)answer->freedom - 1) < 0.2);
     assert_true(fabs(answer->correlation.at[0].at[1]) < 1 && answer->correlation.at[1].at[1] == 1);
     assert_true(fabs(answer->residuals.at[0].rms / measured->deviation - 1) < 0.1);
@@ -166,11 +166,11 @@ TEST(runs_that_fail_take_nothing_from_the_others) {
     Calibration *one_sided = calibrate_failing(&request, run_fails_behind);
     Calibration *first = calibrate_failing(&request, run_fails_beyond_the_first_window);
     const double error = whole->parameters.at[0].standard_error;
-    assert_true(one_sided->failed > 0);
+    assert_true(one_sided->made.failed > 0);
     assert_true(fabs(one_sided->parameters.at[0].standard_error / error - 1) < 0.1);
-    assert_true(first->failed > 0 && first->verdict != CALIBRATE_NOT_EXPLAINED);
+    assert_true(first->made.failed > 0 && first->verdict != CALIBRATE_NOT_EXPLAINED);
     assert_true(fabs(first->parameters.at[0].value - 865) < 50);
-    assert_non_null(strstr(first->warnings.at[0].detail, "failed"));
+    assert_non_null(strstr(first->made.warnings.at[0].detail, "failed"));
     variant_free(&whole->variant);
     variant_free(&one_sided->variant);
     variant_free(&first->variant);
@@ -270,7 +270,7 @@ TEST(a_chaotic_motion_is_fitted_by_its_spectrum_with_an_interval_that_allows_for
     parameter_add(&request, "/structure/stiffness", 750, 1100);
     Calibration *answer = calibrate(&request);
     assert_contains(&answer->parameters.at[0], 865);
-    assert_non_null(strstr(answer->warnings.at[0].detail, "cannot be predicted to the end"));
+    assert_non_null(strstr(answer->made.warnings.at[0].detail, "cannot be predicted to the end"));
     assert_true(answer->parameters.at[0].standard_error > 0.1);
     variant_free(&answer->variant);
     study_request_clear(&request);
