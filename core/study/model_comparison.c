@@ -63,7 +63,7 @@ static const Field compare_entry_fields[] = {
     FIELD_TEXT(CompareEntry, why, 0, PRESENCE_OPTIONAL, 0, "why it did not run to its end"),
     FIELD_REAL(CompareEntry, steps, NULL, ANY, OPTIONAL, "solver steps"),
     FIELD_LIST(CompareEntry, derived, derived_fields, 0, PRESENCE_DEFAULT, "contact parameters derived from the buffers"),
-    FIELD_ITEM(CompareEntry, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as in any result"),
+    FIELD_ITEM(CompareEntry, summary, summary_fields, NULL, PRESENCE_DEFAULT, "as in any result; peak_contact_force is unknown if impacts have no force"),
     FIELD_ITEM(CompareEntry, contacts, compare_contacts_fields, NULL, PRESENCE_DEFAULT, "summary of all impacts"),
     FIELD_ITEM(CompareEntry, differences, compare_differences_fields, NULL, PRESENCE_DEFAULT, "from the reference"),
     FIELD_ITEM(CompareEntry, psd, spectrum_distance_fields, NULL, PRESENCE_DEFAULT, "distance of its spectrum from the reference's"),
@@ -472,7 +472,6 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
         first->summary.peak_contact_force = (double)NAN;
     TRY(comparison_measure(work, reference, tools->progress, first, problem));
     work->work.members = answer->entries.count - 1;
-    work->work.bytes = outcome_bytes(reference);
     work->work.part_bytes =
         sizeof(ComparePart) + sizeof(double) * (answer->frequency.count + (size_t)2 * BUCKETS);
     return STATUS_OK;

@@ -71,7 +71,8 @@ def test_the_study_sets_contact_models_side_by_side():
             contact = {"model": model, **({"separation": separation} if separation else {})}
             other = program.finished(daemon, scene(contact=contact))
             entry = entries[name]
-            assert entry["summary"].items() <= other["summary"].items(), name
+            force = {"peak_contact_force": None} if name == "impulse" else {}  # impulses have none
+            assert entry["summary"].items() <= {**other["summary"], **force}.items(), name
             b = series(daemon, other["result"])["displacement"]
             density = numpy.array(entry["density"])
             band = (frequency >= entry["psd"]["from"]) & (frequency <= entry["psd"]["to"])
