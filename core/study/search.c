@@ -286,11 +286,12 @@ static void search_model_standardise(const Search *search, size_t response) {
         if (isnan(target[i]))
             continue;
         sum += target[i];
-        squares += target[i] * target[i];
         worst = fmax(worst, target[i]);
     }
-    const double mean = count > 0 ? sum / (double)count : 0,
-                 variance = count > 0 ? squares / (double)count - mean * mean : 0,
+    const double mean = count > 0 ? sum / (double)count : 0;
+    for (size_t i = 0; i < model->known; i++)
+        squares += isnan(target[i]) ? 0 : (target[i] - mean) * (target[i] - mean);
+    const double variance = count > 0 ? squares / (double)count : 0,
                  deviation = variance > 1e-24 * mean * mean ? sqrt(variance) : 1;
     model->bound[response] = response == 0 ? (double)NAN : -mean / deviation;
     for (size_t i = 0; i < model->known; i++) {

@@ -47,8 +47,8 @@ void search_free(Search *search);
 // Adds the next candidate, of which there must be one left. STATUS_NO_MEMORY.
 Status search_propose(Search *search);
 
-// Adds the results of the first candidate that has none: objectives, then constraints. One of NAN:
-// it has failed.
+// Adds the results of the first candidate that has none: objectives, then constraints. A result
+// that is NAN marks the candidate as failed. There must be a candidate without results.
 void search_add(Search *search, const double *results);
 
 const double *search_point(const Search *search, size_t candidate);

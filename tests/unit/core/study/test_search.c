@@ -47,6 +47,18 @@ TEST(the_minimum_of_a_smooth_function_needs_few_candidates) {
     }
 }
 
+static void branin_nearly_equal(const double *point, double *results) {
+    branin(point, results);
+    results[0] = 1 + 1e-10 * results[0];
+}
+
+TEST(values_that_agree_to_many_digits_are_searched_like_others) {
+    const SearchSpace space = {.variables = 2, .objectives = 1, .candidates = 60, .seed = 1};
+    Search *search = search_run(&space, branin_nearly_equal, 1);
+    assert_true(best_of(search) < 1 + 0.4e-10);
+    search_free(search);
+}
+
 TEST(the_same_seed_proposes_the_same_candidates_and_another_seed_others) {
     SearchSpace space = {.variables = 2, .objectives = 1, .candidates = 40, .seed = 5};
     Search *first = search_run(&space, branin, 2), *second = search_run(&space, branin, 2);
