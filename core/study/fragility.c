@@ -14,7 +14,6 @@
 enum { COST_RECORDS = 16, NAMES_SHOWN = 3 };
 
 static const double oscillator_step = 0.35; // CPU of one, in solver steps
-static const double confidence = 0.95;
 static const char *const fragility_measure_names[] = {"pga", NULL};
 
 // clang-format off
@@ -197,6 +196,7 @@ static Status fragility_make_scene(const Simulation *base, const PinnedRecord *r
 static Status fragility_base(const FragilityStudy *study, const Simulation *simulation,
                              Simulation *base) {
     TRY(study_run_copy(simulation, base));
+    study_run_fix_solver(base);
     texts_clear(&base->output.psd.channels);
     base->output.impacts = false;
     return study_scene_use_record(base, &study->records.at[0]);
@@ -328,7 +328,6 @@ static Status fragility_begin(void *of, const StudyTools *tools, Problem *proble
     TRY(fragility_warn_of_ends(work));
     work->work.members = work->study->records.count * work->levels;
     work->work.part_bytes = sizeof(StudyPart);
-    work->work.bytes = work->work.members * sizeof(FragilityPoint);
     return STATUS_OK;
 }
 
@@ -415,7 +414,7 @@ static const char *fragility_reason(const CensoredNumber *intervals, size_t coun
         below += intervals[i].low > 0;
     return exceeded == 0 ? "no record exceeds it: take higher levels"
            : below == 0  ? "every record exceeds it at the lowest level: take lower levels"
-                         : "the levels do not tell the records apart: take more levels around the "
+                         : "the levels do not separate the records: take more levels around the "
                            "exceedance, or more records";
 }
 
@@ -436,7 +435,7 @@ static Status fragility_add_state(FragilityWork *work, size_t index, CensoredNum
         state->exceeded += interval.high < (double)INFINITY;
     }
     LognormalFit fit;
-    if (!lognormal_fit(intervals, count, confidence, &fit))
+    if (!lognormal_fit(intervals, count, STATISTICS_CONFIDENCE, &fit))
         return warnings_add(&answer->made.warnings, json_pointer_at("/study/limits", index).at,
                             "median and dispersion are unknown: %s",
                             fragility_reason(intervals, count, state->exceeded));

@@ -8,6 +8,7 @@
 
 #include "core/base/philox.h"
 #include "core/study/statistics.h"
+#include "tests/support/paper.h"
 #include "tests/support/scenes.h"
 #include "tests/support/test.h"
 
@@ -146,7 +147,7 @@ TEST(an_intensity_of_the_scenes_own_oscillator_leaves_no_dispersion) {
             assert_true(fabs(point->metrics.peak_displacement * omega * omega / point->level - 1) <
                         1e-4);
         }
-    static const char *const whys[] = {"do not tell the records apart", "take higher levels",
+    static const char *const whys[] = {"do not separate the records", "take higher levels",
                                        "take lower levels"};
     assert_true(answer->made.warnings.count == 3);
     for (size_t i = 0; i < 3; i++) {
@@ -258,6 +259,33 @@ TEST(an_excitation_that_the_records_would_replace_is_refused) {
     start->displacement.at[0] = 0.01;
     refuse(&request, "/excitation", "give the start with the kind record");
     study_request_clear(&request);
+}
+
+TEST(an_accuracy_target_leaves_all_runs_the_same_settings) {
+    Fragility *answers[2];
+    for (size_t i = 0; i < 2; i++) {
+        StudyRequest request = request_make(2);
+        simulation_clear(&request.simulation);
+        scene_with_damper(&request.simulation, 0.61, 0.025);
+        paper_model(&request.simulation, "hunt_crossley");
+        request.simulation.scene.duration = 5;
+        variant_free(request.simulation.scene.excitation);
+        request.simulation.scene.excitation = variant_new(&excitation_free.kind);
+        if (i == 1)
+            ((AccuracyAuto *)(void *)request.simulation.accuracy)->target = 1e-2;
+        set_levels(study_of(&request), (double[]){1, 4, 8}, 3);
+        add_limit(study_of(&request), "peak_displacement", 0.02);
+        answers[i] = run(&request);
+        study_request_clear(&request);
+    }
+    assert_true(answers[0]->made.steps == answers[1]->made.steps);
+    for (size_t r = 0; r < 2; r++)
+        for (size_t l = 0; l < 3; l++)
+            assert_memory_equal(&answers[0]->curves.at[r].points.at[l].metrics,
+                                &answers[1]->curves.at[r].points.at[l].metrics,
+                                sizeof(StudyMetrics));
+    variant_free(&answers[0]->variant);
+    variant_free(&answers[1]->variant);
 }
 
 static bool stop_at_once(void *context, double fraction) {
