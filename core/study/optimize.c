@@ -340,6 +340,16 @@ static Status optimize_check_statistic(const OptimizeStudy *study, Problem *prob
     return STATUS_OK;
 }
 
+// Whether a record that replaces another one leaves this member of the excitation.
+static bool optimize_record_keeps(const char *pointer) {
+    static const char *const kept[] = {"/excitation/scale", "/excitation/displacement",
+                                       "/excitation/velocity"};
+    bool is_kept = false;
+    for (size_t i = 0; i < COUNT(kept); i++)
+        is_kept = is_kept || json_pointer_overlaps(kept[i], pointer);
+    return is_kept;
+}
+
 // Variables that the seeds or the records of the runs overwrite.
 static Status optimize_check_overwritten(const OptimizeStudy *study, bool is_record,
                                          Problem *problem) {
@@ -347,14 +357,12 @@ static Status optimize_check_overwritten(const OptimizeStudy *study, bool is_rec
     for (size_t i = 0; i < study->variables.count; i++)
         for (size_t k = 0; k < study_axis_pointer_count(&study->variables.at[i]); k++) {
             const char *pointer = study_axis_pointer(&study->variables.at[i], k);
-            const bool is_kept =
-                optimize_has_seeds(study)
-                    ? !json_pointer_overlaps(pointer, "/excitation/seed") &&
-                          !json_pointer_overlaps(pointer, "/excitation/kind")
-                    : study->over.records.count == 0 ||
-                          !json_pointer_overlaps(pointer, "/excitation") ||
-                          (is_record && (strcmp(pointer, "/excitation/scale") == 0 ||
-                                         strcmp(pointer, "/excitation/start") == 0));
+            const bool is_kept = optimize_has_seeds(study)
+                                     ? !json_pointer_overlaps(pointer, "/excitation/seed") &&
+                                           !json_pointer_overlaps(pointer, "/excitation/kind")
+                                     : study->over.records.count == 0 ||
+                                           !json_pointer_overlaps(pointer, "/excitation") ||
+                                           (is_record && optimize_record_keeps(pointer));
             if (!is_kept)
                 status =
                     problem_add(problem, STATUS_INVALID, json_pointer_at("/study/variables", i).at,
@@ -569,7 +577,6 @@ static Status optimize_begin(void *of, const StudyTools *tools, Problem *problem
     TRY(status_made(work->collected != NULL && work->column != NULL && work->metrics != NULL &&
                     work->objectives != NULL));
     work->work.members = (GROUPS_BEFORE + candidates) * work->runs;
-    work->work.bytes = objectives * sizeof(double);
     work->work.part_bytes = sizeof(StudyPart);
     return optimize_propose(work);
 }
@@ -659,14 +666,17 @@ static void optimum_enlarge(const Search *search, size_t best, size_t candidate,
     memcpy(high, upper, n * sizeof *high);
 }
 
-static Status optimum_put_region(const OptimizeWork *work, size_t best) {
+static Status optimum_put_region(const OptimizeWork *work, size_t best, const StudyTools *tools,
+                                 Problem *problem) {
     const Search *search = work->search;
     double ends[2][SEARCH_VARIABLES];
     for (size_t k = 0; k < 2; k++)
         memcpy(ends[k], search_point(search, best), search->space.variables * sizeof(double));
-    for (size_t i = 0; i < search->added; i++)
+    for (size_t i = 0; i < search->added; i++) {
+        TRY(study_advance(tools->progress, 1, problem));
         if (optimum_is_good(search, best, i))
             optimum_enlarge(search, best, i, ends[0], ends[1]);
+    }
     for (size_t j = 0; j < search->space.variables; j++) {
         OptimumInterval *interval = list_append(&work->answer->region, sizeof *interval);
         const SearchVariable *variable = &search->space.variable[j];
@@ -722,11 +732,13 @@ static Status optimum_put_rivals(const OptimizeWork *work, size_t best) {
 
 // The front, by the first objective: the next one is the best by it of those that are better by the
 // second than the last.
-static Status optimum_put_front(const OptimizeWork *work) {
+static Status optimum_put_front(const OptimizeWork *work, const StudyTools *tools,
+                                Problem *problem) {
     const Search *search = work->search;
     double bound = INFINITY;
     for (;;) {
         size_t next = SIZE_MAX;
+        TRY(study_advance(tools->progress, 1, problem));
         for (size_t i = 0; i < search->added; i++) {
             const double *own = search_results(search, i);
             const double *least = next != SIZE_MAX ? search_results(search, next) : NULL;
@@ -780,10 +792,10 @@ static Status optimum_warn_infeasible(const OptimizeWork *work) {
     const OptimizeResult *own = &work->result[worst];
     return warnings_add(
         warnings, json_pointer_at("/study/constraints", own->constraint).at,
-        "no candidate keeps the constraints: %s, which must be at %s %s, is violated least, by "
-        "candidate %zu with %s",
-        study_metric_names[own->metric], own->sign < 0 ? "least" : "most", real_text(own->bound).at,
-        least, real_text(work->metrics[least].of[own->metric]).at);
+        "no candidate keeps all constraints: the nearest one, candidate %zu, has %s %s, which must "
+        "be at %s %s",
+        least, study_metric_names[own->metric], real_text(work->metrics[least].of[own->metric]).at,
+        own->sign < 0 ? "least" : "most", real_text(own->bound).at);
 }
 
 static Status optimum_warn_best(const OptimizeWork *work, size_t best) {
@@ -816,19 +828,19 @@ static Status optimum_warn_best(const OptimizeWork *work, size_t best) {
 static Status optimize_end(void *of, const StudyTools *tools, Problem *problem) {
     OptimizeWork *work = of;
     const bool has_front = work->study->objectives.count > 1;
-    (void)tools;
-    (void)problem;
-    for (size_t i = 0; i < work->search->added; i++)
+    for (size_t i = 0; i < work->search->added; i++) {
+        TRY(study_advance(tools->progress, 1, problem));
         TRY(optimum_put_candidate(work, i, &work->answer->history));
+    }
     TRY(study_runs_warn(&work->answer->made));
     if (has_front)
-        TRY(optimum_put_front(work));
+        TRY(optimum_put_front(work, tools, problem));
     const size_t best = has_front ? optimum_compromise(work) : search_best(work->search, 0);
     if (best == SIZE_MAX)
         return optimum_warn_infeasible(work);
     TRY(optimum_put_best(work, best));
     if (!has_front) {
-        TRY(optimum_put_region(work, best));
+        TRY(optimum_put_region(work, best, tools, problem));
         TRY(optimum_put_rivals(work, best));
     }
     return optimum_warn_best(work, best);
@@ -844,6 +856,7 @@ static Status optimize_cost(const void *request, const Simulation *simulation,
                             const SimulationLimits *limits, double *steps) {
     OptimizeWork work = {
         .study = request, .work = {.simulation = simulation, .limits = limits}, .runs = 1};
+    *steps = 0;
     TRY(optimize_search_new(&work, NULL));
     Search *search = work.search;
     const double candidates = (double)search->space.candidates;

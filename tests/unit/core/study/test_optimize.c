@@ -379,3 +379,60 @@ TEST(variables_that_the_seeds_or_records_of_the_runs_replace_are_refused) {
     assert_non_null(strstr(refusal(&request, "/study/variables/2"), "/excitation/rms"));
     end(&request, NULL);
 }
+
+static NamedRecord *record_make(const char *name) {
+    double *values = calloc(50, sizeof *values);
+    assert_non_null(values);
+    values[10] = 3;
+    Reals samples = {values, 50};
+    NamedRecord *named = named_record_new(name, "0123", 0.02, &samples);
+    assert_non_null(named);
+    return named;
+}
+
+// What a record keeps of the scene's own, which it replaces, may vary.
+TEST(the_initial_state_of_a_record_may_vary) {
+    StudyRequest request = request_make(4);
+    study_of(&request)->over.runs = 0;
+    PinnedRecords *records = &study_of(&request)->over.records;
+    records->at = calloc(2, sizeof *records->at);
+    assert_non_null(records->at);
+    for (; records->count < 2; records->count++) {
+        NamedRecord *named = record_make(records->count == 0 ? "quake" : "shock");
+        records->at[records->count] =
+            (PinnedRecord){strdup(named->name), strdup(named->digest), &named->shared};
+    }
+    assert_int_equal(study_scene_use_record(&request.simulation, &records->at[0]), STATUS_OK);
+    variable_add(&request, "/excitation/displacement", 0.001, 0.01);
+    complete(&request);
+    Optimum *optimum = run(&request);
+    assert_true(optimum->made.failed == 0);
+    assert_true(optimum->history.at[0].objectives.at[0] != optimum->history.at[1].objectives.at[0]);
+    StudyAxis *axis = &study_of(&request)->variables.at[0];
+    free(axis->pointer);
+    axis->pointer = strdup("/excitation/name");
+    assert_non_null(strstr(refusal(&request, "/study/variables/0"), "/study/over"));
+    end(&request, optimum);
+}
+
+// After the last run a question of 1, one for every candidate at least.
+static bool count_ends(void *context, double fraction) {
+    size_t *left = context;
+    return fraction < 1 || (*left)-- > 0;
+}
+
+TEST(an_optimization_stops_also_while_its_answer_is_made) {
+    for (size_t left = 0; left < 20; left++) {
+        StudyRequest request = request_make(10);
+        variable_add(&request, "/dampers/0/clearance", 0.005, 0.04);
+        complete(&request);
+        size_t until = left;
+        const Progress progress = {&until, count_ends};
+        Variant *answer;
+        assert_int_equal(study_run(request.study, &request.simulation,
+                                   &(StudyTools){.progress = &progress}, &answer, &problem),
+                         STATUS_CANCELLED);
+        assert_null(answer);
+        end(&request, NULL);
+    }
+}
