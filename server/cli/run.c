@@ -440,15 +440,12 @@ static Status study_choose(StudyRequest *request, StudySettings *settings, Probl
                            studies[0]->kind.name);
     if (command->kind == NULL)
         return STATUS_OK;
-    const char *given = request->study != NULL ? request->study->kind->name : "";
-    if (command->choose == NULL && given[0] != '\0' && strcmp(given, command->kind->kind.name) != 0)
-        return problem_add(problem, STATUS_INVALID, "/study/kind",
-                           "is %s, not %s: `impactd study` makes it", given,
-                           command->kind->kind.name);
-    if (request->study == NULL || request->study->kind != &command->kind->kind) {
-        variant_free(request->study);
+    if (request->study == NULL)
         request->study = variant_new(&command->kind->kind);
-    }
+    else if (request->study->kind != &command->kind->kind)
+        return problem_add(problem, STATUS_INVALID, "/study/kind",
+                           "is %s, not %s: `impactd study` makes it", request->study->kind->name,
+                           command->kind->kind.name);
     if (request->study == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
     if (command->choose != NULL)

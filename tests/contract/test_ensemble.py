@@ -118,6 +118,9 @@ def test_the_command_prints_statistics_and_writes_all_formats():
     """`ensemble` prints means with their intervals; -o may be given again, for json, csv and svg."""
     with tempfile.TemporaryDirectory() as folder:
         paths = [os.path.join(folder, "out." + ending) for ending in ("json", "csv", "svg")]
+        other = json.dumps({**program.scene("paper_random_sponge"), "study": {"kind": "compare"}})
+        code, _, errors = program.run("ensemble", "-", text=other)
+        assert code == 3 and "is compare, not ensemble" in errors, errors
         code, out, errors = program.run("ensemble", SPONGE, "--runs", "20",
                                         *[word for path in paths for word in ("-o", path)])
         assert code == 0 and "must" not in errors, (code, errors)
