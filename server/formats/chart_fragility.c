@@ -32,12 +32,16 @@ static double fragility_share(const Fragility *answer, const FragilityState *lim
     return known > 0 ? (double)exceeded / (double)known : (double)NAN;
 }
 
+static const char *fragility_limit_text(Chart *chart, const FragilityState *limit) {
+    const char *unit = study_metric_unit(limit->metric);
+    return chart_text(chart, "%s above %g%s%s", study_metric_names[limit->metric], limit->value,
+                      unit != NULL ? " " : "", unit != NULL ? unit : "");
+}
+
 static void fragility_add_limit(Chart *chart, ChartPanel *panel, const Fragility *answer,
                                 size_t index, const double *levels, size_t count) {
     const FragilityState *limit = &answer->limits.at[index];
-    const char *unit = study_metric_unit(limit->metric);
-    const char *name = chart_text(chart, "%s above %g%s%s", study_metric_names[limit->metric],
-                                  limit->value, unit != NULL ? " " : "", unit != NULL ? unit : "");
+    const char *name = fragility_limit_text(chart, limit);
     const size_t colour = index % CHART_COLOURS;
     double *shares = chart_new(chart, count, sizeof *shares);
     double *x = chart_new(chart, POINTS, sizeof *x), *y = chart_new(chart, POINTS, sizeof *y);
@@ -112,24 +116,30 @@ void chart_fragility(const Variant *variant, Bytes *bytes) {
     for (size_t l = 0; l < count && levels != NULL; l++)
         levels[l] = answer->curves.at[0].points.at[l].level;
     chart.heading = chart_text(&chart, "Fragility of %zu ground motions", answer->curves.count);
+    bytes_format(&chart.description,
+                 "Dots: shares of the records; lines: lognormal distributions. Below: medians and "
+                 "bands of 16 to 84 %% of the records. %llu of %llu runs failed.",
+                 (unsigned long long)answer->made.failed, (unsigned long long)answer->made.runs);
     ChartPanel *panel = chart_panel(&chart, "probability of exceeding a limit", 240);
-    for (size_t i = 0; i < answer->limits.count && i < LIMITS_DRAWN && count > 0; i++)
-        fragility_add_limit(&chart, panel, answer, i, levels, count);
+    for (size_t i = 0; i < answer->limits.count && count > 0; i++)
+        if (i < LIMITS_DRAWN)
+            fragility_add_limit(&chart, panel, answer, i, levels, count);
+        else
+            chart_note(&chart, " Not drawn: ", fragility_limit_text(&chart, &answer->limits.at[i]));
     for (size_t i = 0; i < answer->limits.count && count > 0; i++) {
         size_t first = 0;
         while (answer->limits.at[first].metric != answer->limits.at[i].metric)
             first++;
+        const int metric = answer->limits.at[i].metric;
         if (first == i && chart.count <= METRICS_DRAWN)
-            fragility_add_metric(&chart, answer, answer->limits.at[i].metric, levels, count);
+            fragility_add_metric(&chart, answer, metric, levels, count);
+        else if (first == i)
+            chart_note(&chart, " Not drawn: fractiles of ", study_metric_names[metric]);
     }
     for (size_t i = 0; i < chart.count; i++) {
         chart.panels[i].x.is_unlabelled = i + 1 < chart.count;
         chart.panels[i].x.title = fragility_axis(&chart, &answer->intensity);
     }
-    bytes_format(&chart.description,
-                 "Dots: shares of the records; lines: lognormal distributions. Below: medians and "
-                 "bands of 16 to 84 %% of the records. %llu of %llu runs failed.",
-                 (unsigned long long)answer->made.failed, (unsigned long long)answer->made.runs);
     for (size_t i = 0; i < answer->made.warnings.count; i++)
         chart_note(&chart, " ", answer->made.warnings.at[i].detail);
     chart_write(&chart, bytes);

@@ -11,11 +11,6 @@
 // Values are at the edge beyond so many times the difference from the best to the median.
 static const double optimum_outlier = 4;
 
-static int optimum_compare_values(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static const char *optimum_quantity(Chart *chart, const Optimum *optimum, size_t objective) {
     const int metric = optimum->objectives.at[objective].metric;
     return chart_quantity(chart, study_metric_names[metric], study_metric_unit(metric));
@@ -41,7 +36,7 @@ static double *optimum_values_of(Chart *chart, const OptimumCandidates *rows, si
         if (!isnan(values[i]))
             sorted[known++] = sign * values[i];
     }
-    qsort(sorted, known, sizeof *sorted, optimum_compare_values);
+    reals_sort(sorted, known);
     if (known == 0)
         return values;
     const double limit = sorted[0] + optimum_outlier * (sorted[known / 2] - sorted[0]);
