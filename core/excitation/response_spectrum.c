@@ -3,8 +3,8 @@
 // the Seismological Society of America 59 (1969) 909-922). A sample interval is one piece, or so
 // many that the phase omega h of a piece is at most PHASE_MAX.
 //
-// With E = |x'| + omega |x| at the start of a piece, which grows by |a_g| at most, and A the
-// largest |a_g|
+// E = |x'_0| + omega |x_0| at the start of a piece is at least sqrt(x'^2 + (omega x)^2), which
+// grows by at most |a_g| per time; with A the largest |a_g|
 //
 //   |x| <= max(|x_0|, |x_1|) + h^2/8 ((1 + 2 xi) omega (E + h A) + A).
 //

@@ -110,7 +110,7 @@ Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, 
     if (axis->values.count > 0 && (has_range || axis->spacing != CHOICE_ABSENT))
         return problem_add(problem, STATUS_INVALID, place,
                            "has values and a range: leave out values, or %s%s", range,
-                           is_grid ? " and spacing" : "");
+                           axis->spacing != CHOICE_ABSENT ? " and spacing" : "");
     if (axis->values.count > 0)
         return STATUS_OK;
     if (isnan(axis->from) || isnan(axis->to) || (is_grid && axis->count == COUNT_ABSENT))
@@ -133,8 +133,8 @@ JsonPointer study_axis_place(const StudyAxis *axis, const char *place, size_t in
                                  : json_pointer_at(json_pointer_of(place, "pointers").at, index);
 }
 
-// Refuses pointer `index` of axis `number` if an earlier one is the same or, but in a grid, sets
-// the same member.
+// Refuses pointer `index` of axis `number` if an earlier one is the same or, unless it is a grid,
+// designates the same member.
 static Status study_axes_check_pointer(const StudyAxes *axes, bool is_grid, size_t number,
                                        size_t index, const char *place, Problem *problem) {
     const char *pointer = study_axis_pointer(&axes->at[number], index);
@@ -272,11 +272,12 @@ const Field *study_axis_find(const StudyAxis *axis, Simulation *scene, bool *is_
     bool is_sound = true;
     for (size_t i = 0; i < study_axis_pointer_count(axis); i++) {
         const char *pointer = study_axis_pointer(axis, i);
-        char why[JSON_POINTER_MESSAGE_MAX];
+        char why[JSON_POINTER_MESSAGE_MAX] = "no memory for a scene";
         bool is_name;
-        if (study_scene_split_buffer(pointer, scene) != STATUS_OK)
-            snprintf(why, sizeof why, "no memory for a scene");
-        const Field *field = json_pointer_find(simulation_fields, scene, pointer, &is_name, why);
+        const Field *field =
+            study_scene_split_buffer(pointer, scene) == STATUS_OK
+                ? json_pointer_find(simulation_fields, scene, pointer, &is_name, why)
+                : NULL;
         if (field == NULL) {
             Fault fault = {0};
             text_fit(fault.pointer, sizeof fault.pointer, study_axis_place(axis, place, i).at);

@@ -89,8 +89,8 @@ StudyValue study_axis_value(const StudyAxis *axis, size_t index);
 Status study_axis_check(const StudyAxis *axis, bool is_grid, const char *place, Problem *problem);
 // That it varies the physics alone, not how it is computed.
 Status study_axis_check_physics(const StudyAxis *axis, const char *place, Problem *problem);
-// Both of all, the second but of a grid, below `place` ("/study/axes"), and that no two vary the
-// same member.
+// study_axis_check of every axis, study_axis_check_physics unless it is a grid, and that no two
+// axes vary the same member; below `place` ("/study/axes").
 Status study_axes_check(const StudyAxes *axes, bool is_grid, const char *place, Problem *problem);
 
 // The row of the first member that an axis varies; NULL, and a fault below `place`, that of the
@@ -100,8 +100,8 @@ const Field *study_axis_find(const StudyAxis *axis, Simulation *scene, bool *is_
                              const char *place, Problem *problem);
 // Whether a member, of this row, takes every number of its range.
 bool study_field_is_real(const Field *field, bool is_tag);
-// The same of all axes in the completed simulation; `rows` and `are_tags`, one of each axis, may be
-// NULL. STATUS_INVALID if a row is NULL.
+// study_axis_find of all axes, in a copy of the completed simulation; `rows` and `are_tags`, one of
+// each axis, may be NULL. STATUS_INVALID if a row is NULL.
 Status study_axes_find(const StudyAxes *axes, const Simulation *simulation, const char *place,
                        const Field **rows, bool *are_tags, Problem *problem);
 
@@ -120,7 +120,8 @@ Status study_scene_make(const Simulation *base, const StudyAxes *axes, const Stu
                         Simulation *target, Problem *problem);
 
 // Makes a pinned and resolved record the ground motion of a scene, which has to be completed again:
-// an excitation of another kind is replaced, of a record scale and start stay. STATUS_NO_MEMORY.
+// an excitation of another kind is replaced; the scale and the initial state of a record stay.
+// STATUS_NO_MEMORY.
 Status study_scene_use_record(Simulation *scene, const PinnedRecord *pinned);
 
 // For a study of a suite of records, before its scene is completed: the first one is the ground

@@ -784,7 +784,6 @@ Status calibrate_begin(void *of, const StudyTools *tools, Problem *problem) {
     work->work.wanted = work->run_count;
     calibrate_estimate_runs(work);
     work->work.part_bytes = sizeof(CalibratePart) + rows * sizeof(double);
-    work->work.bytes = (starts + work->variables) * rows * sizeof(double);
     return STATUS_OK;
 }
 

@@ -2,9 +2,9 @@
 // of the table and its spectra are added up; a run that fails is a row with its reason.
 //
 // With uncertain inputs it is the scene of a draw, and may have one channel for the displacement
-// over time. For Sobol indices each base sample has k + 2 runs (sobol_indices.h), of which the
-// first two, of independent draws, are rows of the table. Under a random base the seed is an input
-// like the others: its share of the variance is that of the ground motion.
+// over time. For Sobol indices each base sample has k + 2 runs (SobolRuns in statistics.h), of
+// which the first two, of independent draws, are rows of the table. Under a random base the seed is
+// an input like the others: its share of the variance is that of the ground motion.
 #include "core/study/ensemble.h"
 
 #include <math.h>
@@ -29,7 +29,7 @@ static const Field ensemble_study_fields[] = {
     FIELD_REAL(EnsembleStudy, target, NULL, ABOVE(0), OPTIONAL, "wanted relative error of the metric's mean, against its mean over all of the runs: no more runs are made than necessary; all are made if absent"),
     FIELD_CHOICE(EnsembleStudy, metric, statistics_metric_names, OPTIONAL, "metric of the target; psd: norm of the difference of the mean densities over the norm of the density, of the channel with the largest error; rms_displacement if absent"),
     FIELD_LIST(EnsembleStudy, inputs, uncertain_input_fields, INPUTS_MAX, PRESENCE_OPTIONAL, "uncertain members of the scene, drawn independently for each run; with inputs the excitation may be of any kind"),
-    FIELD_CHOICE(EnsembleStudy, sampling, sampling_names, OPTIONAL, "points of the draws: independent, a Latin hypercube or a Sobol sequence with a random shift (evenest if runs is a power of 2), under which intervals of means are on the safe side; random if absent"),
+    FIELD_CHOICE(EnsembleStudy, sampling, sampling_names, OPTIONAL, "points of the draws: independent, a Latin hypercube or a Sobol sequence with a random shift (most uniform if runs is a power of 2), under which intervals of means are on the safe side; random if absent"),
     FIELD_FLAG(EnsembleStudy, sobol_indices, false, "Sobol indices of the inputs, and of the seed under a random base"),
     FIELD_END
 };
@@ -602,8 +602,6 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
         work->work.wanted = STOPPING_RULE_PILOT;
     const size_t history = work->base.output.channels.count > 0 ? 2 * HISTORY_POINTS : 0;
     work->work.part_bytes = sizeof(EnsemblePart) + sizeof(double) * ((size_t)densities + history);
-    work->work.bytes = sizeof(double) * ((size_t)densities * work->kept +
-                                         history / 2 * ensemble_kept(study, HISTORY_POINTS));
     answer->first_seed = study->first_seed;
     answer->confidence = STATISTICS_CONFIDENCE;
     return STATUS_OK;

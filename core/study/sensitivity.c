@@ -814,7 +814,6 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     const size_t densities =
         work->own->spectrum.densities.count * work->own->spectrum.densities.rows;
     work->work.members = work->steps + runs;
-    work->work.bytes = outcome_bytes(work->own) + sizeof(double) * densities * runs;
     work->work.part_bytes = sizeof(StudyPart) + sizeof(double) * densities;
     return STATUS_OK;
 }

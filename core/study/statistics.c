@@ -535,7 +535,8 @@ Status sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *ind
         student_t_quantile(STATISTICS_CONFIDENCE, (size_t)index->samples - 1) / sqrt(n * (n - 1));
     for (size_t k = 0; k < COUNT(squares); k++) {
         *values[k] = means[k] / variance;
-        TRY(study_copy_interval(*values[k], t * sqrt(squares[k]), intervals[k]));
+        const double half = t * sqrt(squares[k]);
+        TRY(study_copy_reals((double[]){*values[k] - half, *values[k] + half}, 2, intervals[k]));
     }
     return STATUS_OK;
 }
@@ -543,9 +544,9 @@ Status sobol_index_estimate(const SobolRuns *runs, size_t input, SobolIndex *ind
 // The lognormal fit. With x = ln of a bound and z = alpha x - gamma, alpha = 1 / beta and gamma =
 // mu / beta, the likelihood is the product of Phi(z_high) - Phi(z_low). Its logarithm is concave in
 // alpha and gamma (Burridge, Journal of the Royal Statistical Society B 43 (1981) 41-45), so that
-// Newton's method with halved steps finds its maximum. That exists where no direction in (alpha,
-// gamma) lowers no term: there are lower and upper bounds, and the largest lower one is above the
-// smallest upper one.
+// Newton's method with halved steps finds its maximum. A maximum with 0 < beta < infinity exists
+// where the largest lower bound is above the smallest upper one (else beta tends to 0) and the
+// largest upper bound is above the smallest lower one (else beta tends to infinity).
 //
 // The covariance of mu and ln beta is the inverse of the observed information. Student's t in place
 // of the normal distribution makes the intervals of few numbers wide enough.

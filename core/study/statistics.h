@@ -107,11 +107,12 @@ typedef struct RunAggregate {
     double quantile; // NAN: the mean, unless is_max
 } RunAggregate;
 
-// Its value, of at least one known number; they are sorted, but for a mean. NAN if one is unknown.
+// The aggregate of at least one number; NAN if one is NAN. Sorts `values`, unless it is a mean.
 double run_aggregate(const RunAggregate *aggregate, double *values, size_t count);
 
 // The 95 % confidence interval over all possible runs: of a mean by Student's t, of a quantile by
 // order statistics, whatever the distribution; NAN where there is none, as of a largest value.
+// Sorts `values` for a quantile.
 void run_aggregate_interval(const RunAggregate *aggregate, double *values, size_t count,
                             double interval[2]);
 
@@ -131,10 +132,10 @@ double statistics_value(const Summary *summary, int metric);
 double statistics_quantile(const double *sorted, size_t count, double share);
 
 // Fills the statistics of a metric. `statistic` holds its defaults, which remain where the known
-// values are too few, and the caller's `value`.
+// values are too few, and the caller's `value`. STATUS_NO_MEMORY.
 Status statistics_fill(const RunTable *table, int metric, RunStatistic *statistic);
 
-// Spread of one metric.
+// Spread of one metric. STATUS_NO_MEMORY.
 Status statistics_spread(const RunTable *table, int metric, RunSpread *spread);
 
 void statistics_trust(const RunTable *table, RunTrust *trust);
@@ -170,7 +171,7 @@ typedef struct SpectrumAccumulator {
 } SpectrumAccumulator;
 
 // Adds the spectra of a run, of the same shape as those before; the densities of the first
-// `kept_max` runs are kept, and the first spectrum is taken.
+// `kept_max` runs are kept, and the first spectrum is taken. STATUS_NO_MEMORY.
 Status spectrum_accumulator_add(SpectrumAccumulator *sums, Spectrum *spectrum, size_t kept_max);
 
 // Spread of the runs: norm of the difference over norm of the mean density, of the channel with the
@@ -184,7 +185,8 @@ enum {
 };
 
 // Fills frequencies and spectra. `value`: of the study's own scene; NULL: none. `progress` may stop
-// the sorting for quantiles.
+// the sorting for quantiles. STATUS_NO_MEMORY, STATUS_CANCELLED, STATUS_UNSTABLE where deviations
+// overflow.
 Status spectrum_accumulator_report(const SpectrumAccumulator *sums, const Spectrum *value, int what,
                                    const Progress *progress, Reals *frequency, RunSpectra *spectra,
                                    Problem *problem);
@@ -227,9 +229,8 @@ typedef struct LognormalFit {
     double median_interval[2], dispersion_interval[2];
 } LognormalFit;
 
-// Intervals have this confidence. False where the likelihood has no maximum: without a number that
-// is surely above another one the dispersion may be 0, and without one that ends and one that
-// begins at a bound nothing is known of the median.
+// Intervals have this confidence. False where the likelihood has no maximum: it then grows as the
+// dispersion tends to 0 or to infinity, or there are no lower or no upper bounds.
 bool lognormal_fit(const CensoredNumber *numbers, size_t count, double confidence,
                    LognormalFit *fit);
 

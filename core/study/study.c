@@ -21,10 +21,6 @@ Status study_copy_reals(const double *values, size_t count, Reals *target) {
     return STATUS_OK;
 }
 
-Status study_copy_interval(double middle, double half, Reals *target) {
-    return study_copy_reals((double[]){middle - half, middle + half}, 2, target);
-}
-
 Status study_add_real(double value, Reals *reals) {
     double *added = list_grow(reals, sizeof *added);
     TRY(status_made(added != NULL));

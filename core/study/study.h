@@ -100,8 +100,7 @@ Status study_run_check_names(const Texts *given, const char *const *names, const
                              Problem *problem);
 
 // The scene without sampled channels and without its undamped run; spectra and impacts as in the
-// original. `target` is cleared
-// by simulation_clear in any case.
+// original. `target` is cleared by simulation_clear in any case.
 Status study_run_copy(const Simulation *simulation, Simulation *target);
 
 // Replaces an accuracy target by the solver that is chosen without one: otherwise the runs of one
@@ -127,11 +126,8 @@ static inline Status study_first_failure(Status first, Status second) {
     return first != STATUS_OK ? first : second;
 }
 
-// A copy of numbers. STATUS_NO_MEMORY, as of all functions below.
+// A copy of numbers. STATUS_NO_MEMORY, as of the next.
 Status study_copy_reals(const double *values, size_t count, Reals *target);
-
-// The two numbers middle -+ half.
-Status study_copy_interval(double middle, double half, Reals *target);
 
 // Appends a number.
 Status study_add_real(double value, Reals *reals);
@@ -149,8 +145,7 @@ typedef struct StudyWork {
     size_t members;    // at most
     size_t wanted;     // the first ones; the study ends when the last of them is folded
     size_t expected;   // estimate of the final `wanted`
-    size_t bytes;      // of memory held by the work, about
-    size_t part_bytes; // and by each part, at most
+    size_t part_bytes; // of memory held by each part, at most
 } StudyWork;
 
 // Result of one member; first member of each kind's own struct.
@@ -174,9 +169,9 @@ struct StudyKind {
     // Where a request names materials and records, as it was read; NULL: nowhere.
     void (*references)(void *study, struct StudyReferences *references);
     // Changes the scene as the study needs it, before it is completed; names are resolved. NULL:
-    // no.
+    // changes nothing.
     Status (*prepare)(const void *study, Simulation *simulation, Problem *problem);
-    double max_runs; // its cost may be that of so many runs at their limit; 0: ten
+    double max_runs; // multiple of limits->steps that the whole study may cost; 0: ten
     // Validates what rows cannot express and completes defaults, below "/study", for a completed
     // scene.
     Status (*complete)(void *study, const Simulation *simulation, const SimulationLimits *limits,
