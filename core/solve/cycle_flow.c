@@ -149,6 +149,7 @@ Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t co
     const uint64_t before = flow->response.impact_count;
     linearised->columns = columns;
     linearised->count = columns != NULL ? count : 0;
+    memset(linearised->late, 0, linearised->size * sizeof *linearised->late);
     cycle_flow_clear_resting(flow, columns, linearised->count);
     linearised->is_measured = motion != NULL;
     linearised->peak = 0;
@@ -364,12 +365,14 @@ static Status cycle_flow_difference(CycleFlow *flow, size_t period) {
     return STATUS_OK;
 }
 
-// Largest scaled difference of two states.
+// Largest scaled difference of two states; INFINITY if a number is NaN.
 static double cycle_flow_distance(const Orbit *orbit, const double *a, const double *b) {
     double most = 0;
     for (size_t i = 0; i < orbit->size; i++) {
         const double difference = fabs(a[i] - b[i]) / orbit->scales[i];
-        most = difference <= most ? most : difference; // NaN counts as the largest
+        if (isnan(difference))
+            return (double)INFINITY;
+        most = fmax(most, difference);
     }
     return most;
 }
@@ -402,8 +405,9 @@ Status cycle_flow_multiply(CycleFlow *flow) {
     return status == STATUS_NO_MEMORY ? status : STATUS_OK;
 }
 
-// The step of Newton's method: (I - P') step = P(y) - y, the smallest one of least squares.
-static void cycle_flow_solve(CycleFlow *flow) {
+// The step of Newton's method: (I - P') step = P(y) - y, the smallest one of least squares. False:
+// there is none.
+static bool cycle_flow_solve(CycleFlow *flow) {
     const Orbit *orbit = &flow->orbit;
     const size_t n = orbit->size;
     double *A = flow->left, *normal = A + n * n, *step = flow->step, largest = 0;
@@ -422,7 +426,10 @@ static void cycle_flow_solve(CycleFlow *flow) {
     }
     for (size_t i = 0; i < n; i++)
         normal[i * n + i] += RIDGE * largest;
-    (void)linear_system_solve(normal, step, n, 1);
+    bool is_solved = linear_system_solve(normal, step, n, 1);
+    for (size_t i = 0; i < n; i++)
+        is_solved = is_solved && isfinite(step[i]);
+    return is_solved;
 }
 
 Status cycle_flow_shoot(CycleFlow *flow, size_t period) {
@@ -434,9 +441,8 @@ Status cycle_flow_shoot(CycleFlow *flow, size_t period) {
     cycle_flow_get(flow, orbit->y);
     for (int i = 0; i < NEWTON_STEPS && orbit->period == 0; i++) {
         const double change = cycle_flow_map(flow, period, true, &status);
-        if (!(change < FARTHEST))
+        if (!(change < FARTHEST) || !cycle_flow_solve(flow))
             break;
-        cycle_flow_solve(flow);
         double step = 0;
         for (size_t k = 0; k < orbit->size; k++) {
             orbit->y[k] += flow->step[k] * orbit->scales[k];
