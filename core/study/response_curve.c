@@ -17,7 +17,6 @@
 #include "core/base/json_pointer.h"
 #include "core/math/linear_system.h"
 #include "core/solve/cycle_flow.h"
-#include "core/study/sweep.h"
 
 enum {
     CURVE_BRANCHES = 64,   // continued
@@ -44,7 +43,7 @@ static const Field response_study_fields[] = {
     FIELD_CHOICE(ResponseStudy, direction, curve_direction_names, CURVE_UP, "up: from, then on to to, each point from the state of the one before; down: the reverse; both: up, then down"),
     FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic; fewer where a stable orbit is found earlier, up to three times as many where the motion has not yet left an unstable one"),
     FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CYCLE_FLOW_PERIOD), 8, "longest period searched for, in cycles of the sine"),
-    FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits: at most four points for each value of the axis, and 200"),
+    FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits: at most four points for each value of the axis, and 200; each one is a run too"),
     FIELD_COUNT(ResponseStudy, section_points, NULL, WITHIN(0, CURVE_SECTION), 64, "points of the section where no periodic orbit is found"),
     FIELD_BASE(ResponseStudy, names, study_names_fields),
     FIELD_END
@@ -67,7 +66,7 @@ const Field response_point_fields[] = {
     FIELD_END
 };
 
-static const Field response_failure_fields[] = {STUDY_FAILURE_ROWS("first_point", "index of the first of them")};
+static const Field response_failure_fields[] = {STUDY_FAILURE_ROWS("first_point", "index of the first of them; of a continuation, of the point that it began at")};
 static const Field response_runs_fields[] = {STUDY_RUNS_ROWS(response_failure_fields)};
 
 static const Field response_answer_fields[] = {
@@ -207,8 +206,10 @@ static size_t curve_wander_cycles(const ResponseStudy *study) {
 static Status curve_cost(const void *request, const Simulation *simulation,
                          const SimulationLimits *limits, double *steps) {
     const ResponseStudy *study = request;
-    const bool varies_frequency =
-        study->axis.pointer != NULL && strcmp(study->axis.pointer, "/excitation/frequency") == 0;
+    bool varies_frequency = false;
+    for (size_t i = 0; i < study_axis_pointer_count(&study->axis); i++)
+        varies_frequency |=
+            strcmp(study_axis_pointer(&study->axis, i), "/excitation/frequency") == 0;
     const uint64_t modes = ((const Accuracy *)(const void *)simulation->accuracy)->modes;
     AccuracyExact exact = {{{&solver_exact.kind}, modes}, (double)NAN};
     Simulation view = *simulation; // borrows all but the solver
@@ -365,6 +366,11 @@ static Status curve_fail(CurveWork *work, Status status, size_t number) {
     return STATUS_OK;
 }
 
+static Status curve_count(CurveWork *work, Status status, double steps, size_t number) {
+    const RunRecord run = {.status = status, .steps = steps, .why = work->problem->detail};
+    return study_runs_add(&work->answer->made, &run, number);
+}
+
 static Status curve_advance(CurveWork *work) {
     const ResponseStudy *study = work->study;
     const double all = (double)(curve_points(study) + curve_continued(study));
@@ -384,18 +390,14 @@ static Status curve_sweep(CurveWork *work, int direction) {
         Status status = curve_make_flow(work, value, work->flow, &flow);
         if (status == STATUS_OK)
             status = curve_make_point(work, flow, number);
-        TRY(study_runs_add(&work->answer->made,
-                           &(RunRecord){.status = status,
-                                        .steps = flow != NULL ? cycle_flow_steps(flow) : 0,
-                                        .why = work->problem->detail},
-                           number));
-        if (status == STATUS_OK) {
-            cycle_flow_free(work->flow);
+        const double steps = flow != NULL ? cycle_flow_steps(flow) : 0;
+        CycleFlow *const other = status == STATUS_OK ? work->flow : flow;
+        if (status == STATUS_OK)
             work->flow = flow;
-            continue;
-        }
-        cycle_flow_free(flow);
-        TRY(curve_fail(work, status, number));
+        cycle_flow_free(other);
+        TRY(curve_count(work, status, steps, number));
+        if (status != STATUS_OK)
+            TRY(curve_fail(work, status, number));
     }
     return STATUS_OK;
 }
@@ -431,6 +433,7 @@ static Status curve_evaluate(CurveWork *work, const CycleFlow *from, size_t peri
             work->by_value[i] =
                 (other->end[i] - orbit->end[i]) / orbit->scales[i] / CURVE_DIFFERENCE;
         cycle_flow_restore(*made, orbit->y);
+        work->answer->made.steps += cycle_flow_steps(*made) + cycle_flow_steps(beside);
     }
     cycle_flow_free(beside);
     if (study_run_ends_study(status))
@@ -493,15 +496,24 @@ static void curve_turn(CurveWork *work) {
     }
 }
 
-// A point of a continuation, at which the flow is.
-static Status curve_fill_continued(CurveWork *work, CycleFlow *flow, double value, size_t period) {
+// A point of a continuation that began at point `begin`; the flow is there. One that fails is left
+// out.
+static Status curve_add_continued(CurveWork *work, CycleFlow *flow, double value, size_t period,
+                                  size_t begin) {
+    const double before = cycle_flow_steps(flow);
     ResponsePoint *point = curve_add_point(work, value, CHOICE_ABSENT);
     TRY(status_made(point != NULL));
     point->branch = work->branch;
-    TRY(cycle_flow_multiply(flow));
-    TRY(curve_fill_orbit(flow, period, point));
+    Status status = cycle_flow_multiply(flow);
+    if (status == STATUS_OK)
+        status = curve_fill_orbit(flow, period, point);
     cycle_flow_restore(flow, cycle_flow_orbit(flow)->y);
-    return STATUS_OK;
+    if (status != STATUS_OK) {
+        fields_clear(response_point_fields, point);
+        work->answer->points.count--;
+    }
+    return study_first_failure(status,
+                               curve_count(work, status, cycle_flow_steps(flow) - before, begin));
 }
 
 // Follows the branch of an orbit to one side until it leaves the axis or is lost.
@@ -541,7 +553,7 @@ static Status curve_follow(CurveWork *work, const CurveStart *start, size_t peri
                : count > CURVE_HARD ? step / 2
                                     : step;
         if (status == STATUS_OK)
-            status = curve_fill_continued(work, flow, value, period);
+            status = curve_add_continued(work, flow, value, period, start->point);
     }
     cycle_flow_free(flow);
     if (study_run_ends_study(status))

@@ -50,7 +50,7 @@ typedef struct ResponsePoints {
 typedef struct ResponseCurve {
     Variant variant;
     char *pointer, *unit; // of the axis, of its first member; unit NULL: none
-    StudyRuns made;       // points
+    StudyRuns made;       // points, but for the first ones of continuations
     ResponsePoints points;
 } ResponseCurve;
 

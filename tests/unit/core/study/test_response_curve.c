@@ -139,6 +139,7 @@ TEST(a_continuation_follows_a_branch_through_a_fold) {
     }
     assert_true(curve->points.count > 30 && curve->points.count <= 20 + 4 * 20 + 200);
     assert_true(unstable > 0 && folds > 0);
+    assert_true(curve->made.runs > 40 && curve->made.failed == 0 && curve->made.steps > 0);
     variant_free(&curve->variant);
 }
 
@@ -191,6 +192,26 @@ TEST(the_cost_does_not_depend_on_the_solver) {
         study_request_clear(&request);
     }
     assert_true(fabs(steps[1] / steps[0] - 1) < 0.1);
+}
+
+TEST(the_cost_of_tied_members_is_that_of_their_frequency) {
+    double steps[2];
+    for (int i = 0; i < 2; i++) {
+        StudyRequest request = request_make(4);
+        Cost cost;
+        axis_set(&request, "/excitation/frequency", 0.01, 0.02, 5);
+        StudyAxis *axis = &study_of(&request)->axis;
+        if (i == 1) {
+            assert_int_equal(texts_append(&axis->pointers, axis->pointer), STATUS_OK);
+            free(axis->pointer);
+            axis->pointer = NULL;
+        }
+        assert_int_equal(study_request_complete(&request, NULL, NULL, &problem), STATUS_OK);
+        assert_int_equal(study_request_cost(&request, NULL, &cost, NULL), STATUS_OK);
+        steps[i] = cost.steps;
+        study_request_clear(&request);
+    }
+    assert_true(steps[1] == steps[0]);
 }
 
 static bool stop_later(void *context, double fraction) {
