@@ -11,7 +11,7 @@ enum { LEAST_SQUARES_VARIABLES = 16 };
 // Of the residuals r and their Jacobian matrix J at a point. Every variable lies in [0, 1].
 typedef struct NormalEquations {
     size_t count;                                                     // variables
-    double matrix[LEAST_SQUARES_VARIABLES * LEAST_SQUARES_VARIABLES]; // J' J, count x count
+    double matrix[LEAST_SQUARES_VARIABLES * LEAST_SQUARES_VARIABLES]; // J' J, row after row
     double gradient[LEAST_SQUARES_VARIABLES];                         // J' r
 } NormalEquations;
 
@@ -21,11 +21,13 @@ void normal_equations_make(const double *const *columns, size_t count, const dou
 
 // The inverse of J' J: covariance of the variables for residuals of unit variance. Directions that
 // do not change the residuals have variances that are huge, not infinite; that of a variable
-// without any effect is INFINITY and its covariances are 0.
+// without any effect is INFINITY and its covariances are 0. `covariance`: count x count, row after
+// row.
 void least_squares_covariance(const NormalEquations *equations, double *covariance);
 
 // The step whose covariance is the inverse of J' J, from independent standard normal numbers.
-// Directions that do not change the residuals get steps of about 1e6.
+// Directions that do not change the residuals get steps of about 1e6. `normal` and `step` have
+// `count` numbers.
 void least_squares_draw(const NormalEquations *equations, const double *normal, double *step);
 
 // A search: the caller makes the equations of a point, asks for a step and reports its cost.
@@ -41,7 +43,7 @@ typedef struct LeastSquares {
 void least_squares_begin(LeastSquares *search);
 
 // Sets the damped step, within the bounds. False: none would decrease the cost by more than
-// `tolerance`.
+// `tolerance`, or the damping is at its limit.
 bool least_squares_step(LeastSquares *search, double tolerance);
 
 // Moves to the step if its cost is less, and adapts the damping. False: it is not.

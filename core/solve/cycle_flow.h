@@ -10,12 +10,13 @@ enum { CYCLE_FLOW_PERIOD = 64 }; // longest of an orbit that is searched for [cy
 
 typedef struct CycleFlow CycleFlow;
 
-// A flow of `plan`, which it takes, also after a failure, over cycles of `period` [s]. Of `run` it
-// uses the base, a sine or still, the settings of the exact solver or NULL, the limit of steps and
-// the progress.
+// A flow of `plan` over cycles of `period` [s]. Of `run` it uses the base, a sine or still, the
+// settings of the exact solver or NULL, the limit of steps and the progress.
 // Starts from the plan's initial state or, if `from` is not NULL, from the present state of a flow
-// of as many storeys and dampers. Freed by cycle_flow_free; NULL after a failure. The flow borrows
-// `problem`, also for the functions below.
+// of as many storeys and dampers.
+// Takes ownership of `plan`, also after a failure. Copies `*run` and its base; borrows its
+// settings, progress and `problem`, also for the functions below. Freed by cycle_flow_free; NULL
+// after a failure.
 Status cycle_flow_new(Plan *plan, const Run *run, double period, const CycleFlow *from,
                       CycleFlow **flow, Problem *problem);
 void cycle_flow_free(CycleFlow *flow); // NULL is fine
@@ -37,6 +38,7 @@ Orbit *cycle_flow_orbit(CycleFlow *flow);
 // The magnitude of the largest multiplier; NAN: it was not found.
 double cycle_flow_radius(const CycleFlow *flow);
 
+// Writes the present y, orbit->size numbers: modes, [m], [m/s]; not scaled.
 void cycle_flow_get(const CycleFlow *flow, double *y);
 // Keeps the present state with its contacts, and returns to it; `y` replaces it but for contacts
 // (NULL: nothing).
@@ -49,7 +51,8 @@ typedef struct CycleMotion {
 } CycleMotion;
 
 // Moves over `cycles`. `columns`, `count` small changes of the state, one after the other, become
-// those of the end (NULL: none). `motion` may be NULL. Errors are those of Solver.run.
+// those of the end (NULL: none). `columns`: count x size, count at most size. `motion` may be NULL.
+// Errors are those of Solver.run.
 Status cycle_flow_run(CycleFlow *flow, size_t cycles, double *columns, size_t count,
                       CycleMotion *motion);
 

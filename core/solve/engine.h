@@ -388,7 +388,7 @@ void recorder_update(ModalState *state);
 // All zero follows nothing.
 typedef struct LinearisedMotion {
     size_t size;     // of a column: (q, p, r, w), modes and dampers
-    size_t count;    // columns in progress
+    size_t count;    // columns in progress, at most `size`
     double *columns; // borrowed, one after the other
     double *late;    // of each column: delay of the last event [s]; `size` of them
     bool is_measured;

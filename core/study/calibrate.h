@@ -24,7 +24,7 @@ typedef struct MeasuredChannels {
 static inline double measured_time(const MeasuredChannel *measured, size_t sample) {
     return measured->start + (double)sample * measured->interval;
 }
-double measured_rms(const MeasuredChannel *measured); // about the mean
+double measured_rms(const MeasuredChannel *measured); // about the mean, in the channel's unit
 
 typedef enum CalibrateFit { CALIBRATE_TIME, CALIBRATE_PSD } CalibrateFit;
 extern const char *const calibrate_fit_names[];
@@ -51,7 +51,7 @@ extern const char *const calibrate_verdict_names[];
 typedef struct CalibratedParameter {
     StudyMember member;
     char *unit;
-    double value, standard_error;
+    double value, standard_error; // in `unit`, as the next
     Reals interval_95;
     bool is_identifiable;
 } CalibratedParameter;
@@ -63,10 +63,10 @@ typedef struct CalibratedParameters {
 
 // Difference of the fit from one measured channel.
 typedef struct CalibrationResidual {
-    char *channel, *unit; // "dB" of spectra
-    double rms, measured_rms;
-    double deviation; // of the noise, given or estimated
-    uint64_t samples; // compared
+    char *channel, *unit;     // "dB" of spectra
+    double rms, measured_rms; // in `unit`, as the next
+    double deviation;         // of the noise, given or estimated
+    uint64_t samples;         // compared
 } CalibrationResidual;
 
 typedef struct CalibrationResiduals {

@@ -44,7 +44,7 @@ static const Field calibrated_parameter_fields[] = {
     FIELD_BASE(CalibratedParameter, member, study_member_fields),
     FIELD_TEXT(CalibratedParameter, unit, 0, PRESENCE_OPTIONAL, 0, "of its value"),
     FIELD_REAL(CalibratedParameter, value, NULL, ANY, OPTIONAL, "fitted"),
-    FIELD_REAL(CalibratedParameter, standard_error, NULL, ANY, OPTIONAL, "standard deviation of the fitted value; unknown if it is not identifiable"),
+    FIELD_REAL(CalibratedParameter, standard_error, NULL, ANY, OPTIONAL, "standard deviation of the fitted value in its valley; null if the interval is as wide as the range or the verdict is not_explained"),
     FIELD_REALS_OR_NULL(CalibratedParameter, interval_95, NULL, "95 % confidence interval"),
     {.name = "identifiable", .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(CalibratedParameter, is_identifiable, bool), .presence = PRESENCE_DEFAULT, .doc = "the measured motions determine it within its range"},
     FIELD_END
