@@ -20,7 +20,7 @@
 #include "core/solve/simd_kernels.h"
 
 enum { PARTS = 16 }; // of a cycle, at which the section may be
-enum { NEWTON_STEPS = 12, FIRST_TRY = 4, WARM_UP = 8, PATIENCE = 2 };
+enum { NEWTON_STEPS = 12, FIRST_TRY = 4, WARM_UP = 8, EXTENSION_MAX = 2 };
 
 static const double CLOSED = 1e-13; // change by the map at an orbit
 static const double CLOSE = 1e-8;   // a step so small ends at the orbit, but for its square
@@ -459,19 +459,19 @@ Status cycle_flow_shoot(CycleFlow *flow, size_t period) {
 }
 
 // What an orbit beside an aperiodic motion lets expect of it.
-typedef struct CycleFlowOutlook {
-    double stay;     // cycles that it takes to leave the orbit, or to reach it; 0: it is not near
+typedef struct CycleFlowForecast {
+    double cycles;   // cycles that it takes to leave the orbit, or to reach it; 0: it is not near
     bool has_stable; // the orbit is stable, so that the motion may end on it
-} CycleFlowOutlook;
+} CycleFlowForecast;
 
 // Searches an orbit that attracts the motion and to which the last `count` sections of the history
 // return; at the end also one of a single cycle anywhere.
 static Status cycle_flow_try(CycleFlow *flow, size_t count, size_t max_period, bool is_last,
-                             CycleFlowOutlook *outlook) {
+                             CycleFlowForecast *forecast) {
     Orbit *orbit = &flow->orbit;
     const size_t rows = max_period + 1, n = orbit->size;
     const double *now = flow->history + count % rows * n;
-    *outlook = (CycleFlowOutlook){0};
+    *forecast = (CycleFlowForecast){0};
     cycle_flow_scale(flow);
     for (size_t p = 1; p <= max_period && p <= count; p++) {
         const bool returns =
@@ -490,10 +490,10 @@ static Status cycle_flow_try(CycleFlow *flow, size_t count, size_t max_period, b
             return STATUS_OK;
         // Beside a neutral one it may stay for ever.
         if (is_near && !(fabs(radius - 1) < STABLE - 1))
-            outlook->stay =
-                fmax(outlook->stay,
+            forecast->cycles =
+                fmax(forecast->cycles,
                      (double)p * -log(is_stable ? RETURNED[0] : distance) / fabs(log(radius)));
-        outlook->has_stable = outlook->has_stable || is_stable;
+        forecast->has_stable = forecast->has_stable || is_stable;
         orbit->period = 0;
         cycle_flow_restore(flow, NULL);
     }
@@ -502,7 +502,7 @@ static Status cycle_flow_try(CycleFlow *flow, size_t count, size_t max_period, b
 
 Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period) {
     const bool needs_flight = !cycle_flow_is_linearised(flow);
-    const double patience = PATIENCE * (double)cycles;
+    const double extension_max = EXTENSION_MAX * (double)cycles;
     Orbit *orbit = &flow->orbit;
     size_t next = FIRST_TRY, end = cycles;
     bool is_late = false;
@@ -516,14 +516,14 @@ Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period) {
         if (is_last && needs_flight)
             TRY(cycle_flow_shift(flow, false));
         if ((count >= next || is_last) && (!needs_flight || cycle_flow_is_flying(flow))) {
-            CycleFlowOutlook outlook;
-            TRY(cycle_flow_try(flow, count, max_period, is_last, &outlook));
+            CycleFlowForecast forecast;
+            TRY(cycle_flow_try(flow, count, max_period, is_last, &forecast));
             next *= 2;
             if (is_last && orbit->period == 0) {
-                orbit->is_settled = !outlook.has_stable && !(is_late && outlook.stay > 0);
+                orbit->is_settled = !forecast.has_stable && !(is_late && forecast.cycles > 0);
                 if (end == cycles) {
-                    is_late = outlook.stay > patience;
-                    end += (size_t)ceil(fmin(outlook.stay, patience));
+                    is_late = forecast.cycles > extension_max;
+                    end += (size_t)ceil(fmin(forecast.cycles, extension_max));
                 }
             }
         }
@@ -544,8 +544,8 @@ static double cycle_flow_growth(const Orbit *orbit, double *column) {
     return log(size);
 }
 
-Status cycle_flow_wander(CycleFlow *flow, size_t cycles, double *exponent, size_t points,
-                         double (*section)[2], CycleMotion *motion) {
+Status cycle_flow_run_aperiodic(CycleFlow *flow, size_t cycles, double *exponent, size_t points,
+                                double (*section)[2], CycleMotion *motion) {
     const bool is_linearised = cycle_flow_is_linearised(flow);
     const Orbit *orbit = &flow->orbit;
     double *column = flow->step, sum = 0, squares = 0;

@@ -95,7 +95,7 @@ Status cycle_flow_settle(CycleFlow *flow, size_t cycles, size_t max_period);
 // Moves over `cycles` and returns the largest Lyapunov exponent [1/s]; NAN: unknown. The
 // displacement and velocity of the top storey after each of the first `points` cycles are written
 // to `section`.
-Status cycle_flow_wander(CycleFlow *flow, size_t cycles, double *exponent, size_t points,
-                         double (*section)[2], CycleMotion *motion);
+Status cycle_flow_run_aperiodic(CycleFlow *flow, size_t cycles, double *exponent, size_t points,
+                                double (*section)[2], CycleMotion *motion);
 
 #endif

@@ -48,7 +48,7 @@ static const double variance_hann = 1.06;
 static const double correlated_bins = 1.94;
 
 static const double window_growth = 1.4142; // of the length of windows
-static const double rough = 4;              // growth of effects by which valleys are missed
+static const double growth_max = 4;         // growth of effects by which valleys are missed
 static const double difference_share = 0.5; // of the deviation of one parameter alone
 static const double difference_first = 1e-5, difference_min = 1e-9, difference_max = 1e-4,
                     difference_chaos = 0.1;
@@ -58,9 +58,9 @@ static const double tolerance = 1e-3, improvement = 1e-2;
 static const double scatter = 2, explored[] = {0.7, 2, 5, 12, 30, 80}; // standard errors
 static const double scatter_max = 0.5;                                 // of the range
 static const double predictable = 1 / 3.0; // of the trust horizon: errors have grown 2000 times
-static const double enough = 0.2; // half width of an interval of the window before, of the range
-static const double undetermined = 0.5; // half width of an interval, of the range
-static const double rival = 0.25;       // of the range: a valley this far away that fits as well
+// Half widths of intervals, of the range: of the window before, and of the result.
+static const double half_width_max = 0.2, undetermined = 0.5;
+static const double rival_distance_min = 0.25; // of the range, of a valley that fits as well
 
 static const double calibrate_quantile_95 = 1.645; // of the normal distribution, one-sided
 
@@ -510,7 +510,8 @@ static bool calibrate_may_return(const CalibrateWork *work, double limit) {
         return false;
     least_squares_covariance(&before->equations, covariance);
     for (size_t i = 0; i < n * n; i += n + 1) {
-        if (i < n * work->parameters && !(2 * sqrt(before->variance * covariance[i]) < enough))
+        if (i < n * work->parameters &&
+            !(2 * sqrt(before->variance * covariance[i]) < half_width_max))
             return false;
         growth = fmax(growth, fit->equations.matrix[i] * before->variance /
                                   (before->equations.matrix[i] * variance));
@@ -577,7 +578,7 @@ static void calibrate_assess(CalibrateWork *work) {
         for (size_t i = 0; i < n; i++) {
             found->low[i] = fmin(found->low[i], point->at[i]);
             found->high[i] = fmax(found->high[i], point->at[i]);
-            if (fabs(point->at[i] - fit->at[i]) > rival)
+            if (fabs(point->at[i] - fit->at[i]) > rival_distance_min)
                 found->rivals[i] = point->at[i];
         }
     }
@@ -604,7 +605,7 @@ static Status calibrate_end_window(CalibrateWork *work) {
         work->windows = 1;
         return calibrate_open(work, STAGE_FIT);
     }
-    if (calibrate_may_return(work, rough))
+    if (calibrate_may_return(work, growth_max))
         return calibrate_return(work);
     calibrate_truncate_starts(work, CALIBRATE_KEPT);
     CalibrateResult *result = &work->results[work->window];

@@ -22,10 +22,10 @@ enum {
     CURVE_BRANCHES = 64,   // continued
     CURVE_CONTINUED = 200, // points of the continuation, beside four for each value
     CURVE_CORRECTIONS = 8,
-    CURVE_EASY = 4,        // corrections up to which the step grows
-    CURVE_HARD = 5,        // and beyond which it shrinks
-    CURVE_WANDER_MIN = 32, // cycles of a motion without a period
-    CURVE_NAMED = 30,      // points in a warning
+    CURVE_EASY = 4,           // corrections up to which the step grows
+    CURVE_HARD = 5,           // and beyond which it shrinks
+    CURVE_APERIODIC_MIN = 32, // cycles of a motion without a period
+    CURVE_NAMED = 30,         // points in a warning
 };
 
 static const double CURVE_STEP = 0.02, CURVE_STEP_MIN = 1e-4, CURVE_STEP_MAX = 0.05;
@@ -197,9 +197,9 @@ static size_t curve_points_max(const ResponseStudy *study) {
     return curve_points(study) + curve_continued(study);
 }
 
-static size_t curve_wander_cycles(const ResponseStudy *study) {
-    return study->section_points > CURVE_WANDER_MIN ? (size_t)study->section_points
-                                                    : CURVE_WANDER_MIN;
+static size_t curve_aperiodic_cycles(const ResponseStudy *study) {
+    return study->section_points > CURVE_APERIODIC_MIN ? (size_t)study->section_points
+                                                       : CURVE_APERIODIC_MIN;
 }
 
 // As if no point had a period, and with the columns of the linearised motion; by the exact solver.
@@ -224,7 +224,7 @@ static Status curve_cost(const void *request, const Simulation *simulation,
     }
     const double cycle = second * period / (double)study->axis.count;
     const double columns = 1 + (double)curve_state_size(simulation);
-    double cycles = (double)study->settle_cycles + 2 * (double)curve_wander_cycles(study) +
+    double cycles = (double)study->settle_cycles + 2 * (double)curve_aperiodic_cycles(study) +
                     4 * columns * (double)study->max_period;
     cycles *= (double)curve_points(study);
     cycles += (double)curve_continued(study) * 4 * columns * 2;
@@ -292,8 +292,8 @@ static Status curve_fill_section(CurveWork *work, CycleFlow *flow, ResponsePoint
     double(*section)[2] = calloc(points + 1, sizeof *section);
     TRY(status_made(section != NULL));
     CycleMotion motion;
-    Status status = cycle_flow_wander(flow, curve_wander_cycles(work->study), &point->lyapunov,
-                                      points, section, &motion);
+    Status status = cycle_flow_run_aperiodic(flow, curve_aperiodic_cycles(work->study),
+                                             &point->lyapunov, points, section, &motion);
     curve_fill_motion(&motion, flow, point);
     for (size_t i = 0; i < points && status == STATUS_OK; i++)
         status = curve_add_row(section[i][0], section[i][1], &point->section);
@@ -484,7 +484,7 @@ static Status curve_correct(CurveWork *work, const CycleFlow *from, size_t perio
 }
 
 // The next point becomes the last one, and the tangent the secant through both.
-static void curve_turn(CurveWork *work) {
+static void curve_update_tangent(CurveWork *work) {
     double size = 0;
     for (size_t i = 0; i <= work->size; i++) {
         work->tangent[i] = work->z[i] - work->at[i];
@@ -548,7 +548,7 @@ static Status curve_follow(CurveWork *work, const CurveStart *start, size_t peri
         const double value = work->z[n] * span;
         if (!(value >= work->study->axis.from && value <= work->study->axis.to))
             break;
-        curve_turn(work);
+        curve_update_tangent(work);
         step = count < CURVE_EASY   ? fmin(1.5 * step, CURVE_STEP_MAX)
                : count > CURVE_HARD ? step / 2
                                     : step;
