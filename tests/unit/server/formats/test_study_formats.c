@@ -1,6 +1,7 @@
 #include <string.h>
 
 #include "core/study/ensemble.h"
+#include "core/study/fragility.h"
 #include "core/study/optimize.h"
 #include "server/formats/study_formats.h"
 #include "tests/support/test.h"
@@ -68,4 +69,30 @@ TEST(a_chart_of_nothing_known_is_whole) {
     assert_string_equal(bytes.at + bytes.count - 7, "</svg>\n");
     bytes_clear(&bytes);
     variant_free(answer);
+}
+
+TEST(what_the_chart_of_a_fragility_leaves_out_is_named) {
+    Variant *variant = variant_new(study_fragility.answer);
+    assert_non_null(variant);
+    Fragility *answer = (Fragility *)(void *)variant;
+    FragilityCurve *curve = list_append(&answer->curves, sizeof *curve);
+    assert_non_null(curve);
+    assert_non_null(curve->points.at = calloc(2, sizeof *curve->points.at));
+    curve->points.count = 2;
+    for (size_t l = 0; l < 2; l++)
+        curve->points.at[l].level = 1 + (double)l;
+    for (size_t i = 0; i < 9; i++) {
+        FragilityState *limit = list_append(&answer->limits, sizeof *limit);
+        assert_non_null(limit);
+        *limit = (FragilityState){
+            .metric = (int)i % 6, .value = (double)i, .median = 1.5, .dispersion = 0.3};
+    }
+    Bytes bytes = {0};
+    write(variant, "svg", &bytes);
+    assert_non_null(strstr(bytes.at, "Not drawn: peak_acceleration above 8 m/s^2."));
+    assert_null(strstr(bytes.at, "Not drawn: rms_displacement"));
+    assert_non_null(strstr(bytes.at, "Not drawn: fractiles of peak_contact_force."));
+    assert_null(strstr(bytes.at, "fractiles of impacts"));
+    bytes_clear(&bytes);
+    variant_free(variant);
 }
