@@ -3,7 +3,6 @@
 #include "core/study/axis.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,6 @@
 // The candidates of an optimisation: over their number with the best so far, or of two objectives
 // with the front.
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/study/optimize.h"
