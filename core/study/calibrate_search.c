@@ -44,8 +44,6 @@ static const double snap = 1e-8;       // of a sample interval: a time this clos
 static const double floor_share = 0.1; // of the measured densities lies below the noise's
 static const double floor_min = 1e-12; // of the largest density
 static const double variance_hann = 1.06;
-// Sum of the squared correlations of neighbouring frequencies, for Hann's window.
-static const double correlated_bins = 1.94;
 
 static const double window_growth = 1.4142; // of the length of windows
 static const double growth_max = 4;         // growth of effects by which valleys are missed
@@ -550,7 +548,7 @@ static void calibrate_assess(CalibrateWork *work) {
     const LeastSquares *fit = &work->starts[0].fit;
     CalibrateAssessment *found = &work->assessment;
     const size_t n = work->variables;
-    const double share = work->fit == CALIBRATE_PSD ? correlated_bins : 1;
+    const double share = work->fit == CALIBRATE_PSD ? calibrate_correlated_bins : 1;
     const double freedom = fmax(floor((double)work->rows / share) - (double)n, 1);
     bool is_estimated = work->fit == CALIBRATE_PSD;
     for (size_t c = 0; c < work->study->measured.count; c++)

@@ -14,6 +14,8 @@ enum {
 };
 
 static const double calibrate_quantile_999 = 3.09; // of the normal distribution, one-sided
+// Sum of the squared correlations of neighbouring frequencies of a spectrum, for Hann's window.
+static const double calibrate_correlated_bins = 1.94;
 
 // The part of a measured channel that is compared. The measured channel is borrowed.
 typedef struct MeasuredTarget {

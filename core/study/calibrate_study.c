@@ -13,7 +13,7 @@ enum { SAMPLES_MIN = 16, SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000, LAGS =
 
 static const double structured = 0.05;   // of the motion: rms of residuals that is not explained
 static const double rms_min = 1e-100;    // of measured samples: squares of less underflow
-static const double spectrum_misfit = 3; // of the expected rms
+static const double spectrum_misfit = 2; // of the expected variance: spectra that differ
 
 const char *const calibrate_fit_names[] = {"time", "psd", NULL};
 const char *const calibrate_verdict_names[] = {"explained", "not_explained", "not_identifiable",
@@ -329,6 +329,36 @@ static bool calibrate_is_correlated(const double *residual, size_t count) {
            n * (n + 2) * sum > calibrate_chi_square((double)lags, calibrate_quantile_999);
 }
 
+// The sentence if the model does not explain a spectrum. Compared are the frequencies at which the
+// measured or the fitted motion stands out from the noise: most of a spectrum may be noise, which
+// any model fits.
+static Status calibrate_check_spectrum(CalibrateWork *work, const MeasuredTarget *target,
+                                       const CalibrationResidual *residual) {
+    const double *own = work->starts[0].residual + target->place, deviation = target->deviation;
+    // The floor is a low quantile of the noise's densities.
+    const double noise = log(target->floor) + 1.5 * calibrate_quantile_999 * deviation;
+    double squares = 0, bins = 0;
+    for (size_t i = 0; i < target->values.count; i++) {
+        const double value = target->values.at[i];
+        if (fmax(value, value + deviation * own[i]) <= noise)
+            continue;
+        squares += own[i] * own[i];
+        bins++;
+    }
+    // Two estimated spectra, if both are of motions that cannot be predicted.
+    const double expected = work->is_chaotic ? 2 : 1;
+    const double freedom = fmax(bins / calibrate_correlated_bins, 1);
+    const double scatter = calibrate_chi_square(freedom, calibrate_quantile_999) / freedom;
+    if (squares <= fmax(spectrum_misfit, scatter) * expected * bins)
+        return STATUS_OK;
+    return status_made(text_format(
+        &work->answer->detail,
+        "the spectrum of %s differs from the best fit by %.2g dB rms where the motion stands out "
+        "from the noise, and %.2g dB would be expected of spectra of this length",
+        residual->channel, residual->deviation * sqrt(squares / bins),
+        residual->deviation * sqrt(expected)));
+}
+
 // The sentence if the model does not explain a channel, whose noise was not given.
 static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
     Calibration *answer = work->answer;
@@ -336,16 +366,8 @@ static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
     const CalibrationResidual *residual = &answer->residuals.at[c];
     const char *name = residual->channel, *unit = residual->unit;
     const double rms = residual->rms, motion = residual->measured_rms;
-    // Two estimated spectra, if both are of motions that cannot be predicted.
-    const double misfit = spectrum_misfit * (work->is_chaotic ? sqrt(2) : 1);
     if (target->is_spectrum)
-        return rms < misfit * residual->deviation
-                   ? STATUS_OK
-                   : status_made(text_format(
-                         &answer->detail,
-                         "the spectrum of %s differs from the best fit by %.2g dB rms, and %.2g "
-                         "dB would be expected of spectra of this length",
-                         name, rms, residual->deviation));
+        return calibrate_check_spectrum(work, target, residual);
     if (rms >= motion)
         return status_made(text_format(&answer->detail,
                                        "the differences of %s from the best fit, %.2g %s rms, are "

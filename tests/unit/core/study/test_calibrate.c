@@ -254,6 +254,20 @@ TEST(spectra_are_fitted_on_request) {
     study_request_clear(&request);
 }
 
+TEST(a_spectrum_whose_peak_no_value_gives_is_not_explained) {
+    StudyRequest request = request_make();
+    request.simulation.scene.duration = 16;
+    measure(&request, &request.simulation, 0.01)->deviation = (double)NAN;
+    study_of(&request)->fit = CALIBRATE_PSD;
+    study_of(&request)->starts = 1;
+    parameter_add(&request, "/structure/stiffness", 400, 450);
+    Calibration *answer = calibrate(&request);
+    assert_int_equal(answer->verdict, CALIBRATE_NOT_EXPLAINED);
+    assert_non_null(strstr(answer->detail, "stands out from the noise"));
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
 TEST(a_chaotic_motion_is_fitted_by_its_spectrum_with_an_interval_that_allows_for_its_scatter) {
     StudyRequest request = request_make();
     ExcitationSine *sine = (ExcitationSine *)(void *)variant_new(&excitation_sine.kind);
