@@ -12,7 +12,7 @@
 enum { SAMPLES_MIN = 16, SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000, LAGS = 20 };
 
 static const double structured = 0.05;   // of the motion: rms of residuals that is not explained
-static const double rms_min = 1e-100;    // of measured samples: squares of less underflow
+static const double rms_min = 1e-100;    // of samples and noise: squares of less underflow
 static const double spectrum_misfit = 2; // of the expected variance: spectra that differ
 
 const char *const calibrate_fit_names[] = {"time", "psd", NULL};
@@ -126,6 +126,10 @@ static Status calibrate_check_channel(const CalibrateStudy *study, const Simulat
                                     "have the same value, or differ by less than %g: there is no "
                                     "motion to fit",
                                     rms_min);
+    if (measured.deviation < rms_min)
+        status =
+            json_pointer_fault(problem, place.at, "deviation",
+                               "is less than %g: squares of so little cannot be computed", rms_min);
     if (strcmp(measured.channel, CHANNEL_USUAL) == 0)
         return json_pointer_fault(problem, place.at, "channel",
                                   "must name one channel, as displacement");
