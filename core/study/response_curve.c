@@ -70,7 +70,7 @@ static const Field response_failure_fields[] = {STUDY_FAILURE_ROWS("first_point"
 static const Field response_runs_fields[] = {STUDY_RUNS_ROWS(response_failure_fields)};
 
 static const Field response_answer_fields[] = {
-    FIELD_TEXT(ResponseCurve, pointer, 0, PRESENCE_OPTIONAL, 0, "JSON Pointer to the member that varies, the first of tied ones"),
+    FIELD_BASE(ResponseCurve, member, study_member_fields),
     FIELD_TEXT(ResponseCurve, unit, 0, PRESENCE_OPTIONAL, 0, "of its values"),
     FIELD_BASE(ResponseCurve, made, response_runs_fields),
     FIELD_LIST(ResponseCurve, points, response_point_fields, 0, PRESENCE_DEFAULT, "in the order in which they were made, and along each curve of a continuation"),
@@ -343,7 +343,8 @@ static Status curve_make_point(CurveWork *work, CycleFlow *flow, size_t number) 
         TRY(curve_find_branch(work, flow, number, jump));
         return cycle_flow_shift(flow, true);
     }
-    if (!orbit->is_settled)
+    // A linear structure without a steady motion is undamped and in resonance, or nearly so.
+    if (!orbit->is_settled || work->work.simulation->scene.dampers.count == 0)
         curve_note_unsettled(work, number);
     TRY(cycle_flow_shift(flow, true));
     TRY(curve_fill_section(work, flow, point));
@@ -624,7 +625,8 @@ static Status curve_warn(CurveWork *work) {
     if (work->unsettled_count > 0)
         TRY(warnings_add(&made->warnings, "/study/settle_cycles",
                          "may be too few: beside the motion without a period lies an orbit that is "
-                         "stable, or hardly unstable, at %zu of the points, with index %s%s",
+                         "stable, or hardly unstable, or an undamped structure is in resonance, "
+                         "where no number is enough, at %zu of the points, with index %s%s",
                          work->unsettled_count, work->unsettled,
                          work->unsettled_count > CURVE_NAMED ? " and more" : ""));
     return study_runs_warn(made);
@@ -641,7 +643,7 @@ static Status curve_begin(void *of, const StudyTools *tools, Problem *problem) {
     const Field *field = curve_axis_field(&study->axis, work->work.simulation, problem);
     TRY(status_made(field != NULL));
     TRY(text_copy(field->unit, &work->answer->unit));
-    TRY(text_copy(study_axis_pointer(&study->axis, 0), &work->answer->pointer));
+    TRY(study_axis_member(&study->axis, &work->answer->member));
     if (study->direction != CURVE_DOWN)
         TRY(curve_sweep(work, CURVE_UP));
     if (study->direction != CURVE_UP)

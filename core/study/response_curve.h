@@ -49,8 +49,9 @@ typedef struct ResponsePoints {
 // The answer.
 typedef struct ResponseCurve {
     Variant variant;
-    char *pointer, *unit; // of the axis, of its first member; unit NULL: none
-    StudyRuns made;       // points, but for the first ones of continuations
+    StudyMember member; // of the axis
+    char *unit;         // of the first member; NULL: none
+    StudyRuns made;     // points, but for the first ones of continuations
     ResponsePoints points;
 } ResponseCurve;
 

@@ -140,8 +140,8 @@ void chart_response(const Variant *answer, Bytes *bytes) {
                       {CHOICE_ABSENT, "stable, continued", "unstable, continued"}};
     const ResponseCurve *curve = (const ResponseCurve *)(const void *)answer;
     Chart chart = {.width = 720, .left = 90, .right = 180, .title = "Response curve"};
-    const char *axis =
-        chart_quantity(&chart, curve->pointer != NULL ? curve->pointer : "value", curve->unit);
+    const char *axis = chart_quantity(
+        &chart, curve->member.pointer != NULL ? curve->member.pointer : "value", curve->unit);
     ChartPanel *panel = chart_panel(&chart, "peak displacement of the steady motion [m]", 320);
     panel->x.title = axis;
     for (size_t i = 0; i < COUNT(directions); i++) {

@@ -122,6 +122,22 @@ TEST(points_that_may_still_be_transients_are_named) {
     variant_free(&curve->variant);
 }
 
+TEST(a_resonance_without_damping_is_named) {
+    StudyRequest request = request_make(3);
+    scene_without_damper(&request.simulation);
+    paper_sine(&request.simulation, 1, 3);
+    SdofStructure *structure = (SdofStructure *)(void *)request.simulation.scene.structure;
+    structure->mass = 1;
+    structure->stiffness = 355.30575843921691; // of 3 Hz
+    structure->damping = 0;
+    axis_set(&request, "/excitation/frequency", 3, 3.5, 2);
+    ResponseCurve *curve = curve_of(&request);
+    assert_int_equal(curve->points.at[0].period, COUNT_ABSENT);
+    assert_int_equal(curve->made.warnings.count, 1);
+    assert_non_null(strstr(curve->made.warnings.at[0].detail, "with index 0"));
+    variant_free(&curve->variant);
+}
+
 TEST(a_continuation_follows_a_branch_through_a_fold) {
     StudyRequest request = request_make(4);
     study_of(&request)->continuation = true;
@@ -192,6 +208,21 @@ TEST(the_cost_does_not_depend_on_the_solver) {
         study_request_clear(&request);
     }
     assert_true(fabs(steps[1] / steps[0] - 1) < 0.1);
+}
+
+TEST(all_tied_members_are_named) {
+    StudyRequest request = request_make(4);
+    axis_set(&request, "/dampers/0/clearance", 0.01, 0.011, 2);
+    StudyAxis *axis = &study_of(&request)->axis;
+    assert_int_equal(texts_append(&axis->pointers, axis->pointer), STATUS_OK);
+    assert_int_equal(texts_append(&axis->pointers, "/structure/damping"), STATUS_OK);
+    free(axis->pointer);
+    axis->pointer = NULL;
+    ResponseCurve *curve = curve_of(&request);
+    assert_string_equal(curve->member.pointer, "/dampers/0/clearance");
+    assert_int_equal(curve->member.pointers.count, 2);
+    assert_string_equal(curve->member.pointers.at[1], "/structure/damping");
+    variant_free(&curve->variant);
 }
 
 TEST(the_cost_of_tied_members_is_that_of_their_frequency) {

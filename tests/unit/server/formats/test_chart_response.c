@@ -36,7 +36,8 @@ TEST(a_point_is_a_row_of_the_table) {
 
 static char *draw(ResponsePoint *points, size_t count) {
     static char pointer[] = "/excitation/frequency", unit[] = "Hz";
-    const ResponseCurve curve = {.pointer = pointer, .unit = unit, .points = {points, count}};
+    const ResponseCurve curve = {
+        .member.pointer = pointer, .unit = unit, .points = {points, count}};
     Bytes bytes = {0};
     chart_response(&curve.variant, &bytes);
     char *text = bytes_take(&bytes, NULL);
