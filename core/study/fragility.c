@@ -5,6 +5,7 @@
 #include "core/study/fragility.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -406,16 +407,28 @@ static CensoredNumber fragility_interval(const FragilityCurve *curve, const Frag
     return interval;
 }
 
-// Why there is no distribution.
-static const char *fragility_reason(const CensoredNumber *intervals, size_t count,
-                                    size_t exceeded) {
-    size_t below = 0;
-    for (size_t i = 0; i < count; i++)
+// Why there is no distribution. `intervals`: of the `count` records that have one.
+static Status fragility_warn_unknown(Warnings *warnings, const char *place,
+                                     const CensoredNumber *intervals, size_t count,
+                                     size_t exceeded) {
+    char why[160] = "the levels do not separate the records: take more levels around the "
+                    "exceedance, or more records";
+    size_t below = 0, same = 0;
+    for (size_t i = 0; i < count; i++) {
         below += intervals[i].low > 0;
-    return exceeded == 0 ? "no record exceeds it: take higher levels"
-           : below == 0  ? "every record exceeds it at the lowest level: take lower levels"
-                         : "the levels do not separate the records: take more levels around the "
-                           "exceedance, or more records";
+        same += intervals[i].low == intervals[0].low && intervals[i].high == intervals[0].high;
+    }
+    if (count == 0)
+        snprintf(why, sizeof why, "no run has this metric: see the failures");
+    else if (exceeded == 0)
+        snprintf(why, sizeof why, "no record exceeds it: take higher levels");
+    else if (below == 0)
+        snprintf(why, sizeof why, "every record exceeds it at the lowest level: take lower levels");
+    else if (same == count)
+        snprintf(why, sizeof why,
+                 "the levels do not separate the records: take more levels between %s and %s m/s^2",
+                 real_text(intervals[0].low).at, real_text(intervals[0].high).at);
+    return warnings_add(warnings, place, "median and dispersion are unknown: %s", why);
 }
 
 static Status fragility_add_state(FragilityWork *work, size_t index, CensoredNumber *intervals) {
@@ -436,9 +449,9 @@ static Status fragility_add_state(FragilityWork *work, size_t index, CensoredNum
     }
     LognormalFit fit;
     if (!lognormal_fit(intervals, count, STATISTICS_CONFIDENCE, &fit))
-        return warnings_add(&answer->made.warnings, json_pointer_at("/study/limits", index).at,
-                            "median and dispersion are unknown: %s",
-                            fragility_reason(intervals, count, state->exceeded));
+        return fragility_warn_unknown(&answer->made.warnings,
+                                      json_pointer_at("/study/limits", index).at, intervals, count,
+                                      state->exceeded);
     state->median = fit.median;
     state->dispersion = fit.dispersion;
     TRY(study_copy_reals(fit.median_interval, 2, &state->median_interval_95));

@@ -147,14 +147,25 @@ TEST(an_intensity_of_the_scenes_own_oscillator_leaves_no_dispersion) {
             assert_true(fabs(point->metrics.peak_displacement * omega * omega / point->level - 1) <
                         1e-4);
         }
-    static const char *const whys[] = {"do not separate the records", "take higher levels",
-                                       "take lower levels"};
+    static const char *const whys[] = {"take more levels between 2 and 4 m/s^2",
+                                       "take higher levels", "take lower levels"};
     assert_true(answer->made.warnings.count == 3);
     for (size_t i = 0; i < 3; i++) {
         assert_true(isnan(answer->limits.at[i].median) && isnan(answer->limits.at[i].dispersion));
         assert_non_null(strstr(answer->made.warnings.at[i].detail, whys[i]));
     }
     assert_true(answer->limits.at[0].exceeded == 4 && answer->limits.at[1].exceeded == 0);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
+TEST(a_limit_without_a_run_asks_for_no_other_levels) {
+    StudyRequest request = request_make(2);
+    set_levels(study_of(&request), (double[]){1e200, 2e200}, 2);
+    add_limit(study_of(&request), "peak_displacement", 0.02);
+    Fragility *answer = run(&request);
+    assert_true(answer->made.failed == 4 && answer->limits.at[0].exceeded == 0);
+    assert_non_null(strstr(answer->made.warnings.at[0].detail, "unknown: no run has this metric"));
     variant_free(&answer->variant);
     study_request_clear(&request);
 }
