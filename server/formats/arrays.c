@@ -115,10 +115,10 @@ static Status npy_layout(const Table *table, Segments *segments, Problem *proble
     return STATUS_OK;
 }
 
-// Bytes of the longest text; 0: a column of numbers.
+// Bytes of the longest text, at least 1; 0: a column of numbers.
 static size_t npz_width(const TableColumn *column) {
-    size_t width = 0, length;
-    if (table_column_is_numeric(column))
+    size_t width = 1, length;
+    if (column->texts == NULL || table_column_is_numeric(column))
         return 0;
     for (size_t i = 0; i < column->text_count; i++) {
         (void)table_bare(column, (double)i, &length);

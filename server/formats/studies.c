@@ -19,9 +19,11 @@ static void ensemble_table(const Variant *answer, StudyTable *table) {
         study_table_number(table, "seed", NULL, (double)run->number);
         study_table_number(table, "steps", NULL, run->steps);
         study_table_members(table, NULL, summary_fields, &run->summary);
-        for (size_t k = 0; k < ensemble->inputs.count; k++)
-            study_table_number(table, ensemble->inputs.at[k].pointer, ensemble->inputs.at[k].unit,
+        for (size_t k = 0; k < ensemble->inputs.count; k++) {
+            const EnsembleInput *input = &ensemble->inputs.at[k];
+            study_table_number(table, input->pointer, input->is_factor ? "factor" : input->unit,
                                k < run->inputs.count ? run->inputs.at[k] : (double)NAN);
+        }
         study_table_text(table, "why", run->why);
     }
 }

@@ -279,7 +279,7 @@ def test_uncertain_inputs_have_quantiles_and_indices():
         check_statistics(answer)
         check_csv(table, answer)
         check_chart(chart, answer)
-        assert table.splitlines()[0].endswith(",/dampers/0/clearance [m],/dampers/0/buffer/contact_time,why")
+        assert table.splitlines()[0].endswith(",/dampers/0/clearance [m],/dampers/0/buffer/contact_time [factor],why")
         assert [one["is_factor"] for one in answer["inputs"]] == [False, True] and "Sobol" not in out
         motions, densities = [], []
         del scene["study"]

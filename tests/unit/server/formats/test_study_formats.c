@@ -34,6 +34,25 @@ TEST(a_run_that_failed_is_quoted_in_the_table) {
     bytes_clear(&bytes);
 }
 
+TEST(columns_without_a_word_stay_texts_and_factors_say_so) {
+    char pointer[] = "/dampers/0/clearance", unit[] = "m";
+    double drawn[] = {1.25};
+    RunRecord run = {.number = 7, .inputs = {drawn, 1}};
+    EnsembleInput input = {.pointer = pointer, .unit = unit, .is_factor = true};
+    const Ensemble ensemble = {
+        .variant = {study_ensemble.answer}, .table = {&run, 1}, .inputs = {&input, 1}};
+    Bytes csv = {0}, npz = {0};
+    write(&ensemble.variant, "csv", &csv);
+    assert_non_null(strstr(csv.at, ",/dampers/0/clearance [factor],why\n"));
+    write(&ensemble.variant, "npz", &npz);
+    size_t texts = 0;
+    for (size_t i = 0; i + 5 < npz.count; i++)
+        texts += memcmp(npz.at + i, "'|S1'", 5) == 0;
+    assert_int_equal(texts, 1);
+    bytes_clear(&csv);
+    bytes_clear(&npz);
+}
+
 TEST(a_word_of_a_candidate_is_the_text_itself) {
     char clearance[] = "/dampers/0/clearance", buffer[] = "/dampers/0/buffer";
     char near[] = "0.01", far[] = "2e-2", sponge[] = "\"sponge@1\"",
