@@ -420,12 +420,13 @@ static Status resolve_record(Db *db, const StudyRequest *request, Problem *probl
                        : problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
 }
 
-// A record that a study keeps, at `place`; likewise.
+// A record that a study keeps, at `place`; likewise. Without a digest it may be a name alone.
 static Status resolve_kept_record(Db *db, PinnedRecord *kept, const char *place, Problem *problem) {
     NamedRecord *named;
     if (kept->name == NULL || kept->named != NULL)
         return STATUS_OK; // a missing name is a fault already
-    TRY(record_find(db, kept->name, kept->digest, json_pointer_of(place, "name").at,
+    TRY(record_find(db, kept->name, kept->digest,
+                    kept->digest == NULL ? place : json_pointer_of(place, "name").at,
                     json_pointer_of(place, "digest").at, &named, problem));
     kept->named = &named->shared;
     return kept->digest != NULL || (kept->digest = strdup(named->digest)) != NULL

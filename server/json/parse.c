@@ -159,15 +159,21 @@ static void decode_wrong_type(Decoder *decoder, const char *pointer, const json_
                  type_name(value));
 }
 
-// "must be one of a, b, c, is "x"". Returns the nearest of the names, NULL if none is near.
+// "must be one of a, b, c, is "x"". Returns the nearest of the names, NULL if none is near. `item`:
+// of the object whose shorthand the name is; NULL: none.
 static const char *decode_wrong_name(Decoder *decoder, const char *pointer, const json_t *value,
-                                     const char *const *names) {
+                                     const char *const *names, const Field *item) {
     const char *name = json_string_value(value), *meant = spelling_nearest(names, name);
-    char list[DETAIL_SIZE] = "", shown[64];
+    char list[DETAIL_SIZE] = "", members[DETAIL_SIZE / 2] = "", shown[64];
     for (size_t i = 0; names[i] != NULL; i++)
         text_list(list, sizeof list, names[i]);
+    const Field *row = item != NULL ? item->fields : NULL;
+    for (; row != NULL && row->kind != FIELD_KIND_END; row++)
+        if (strcmp(row->name, item->shorthand) != 0)
+            text_list(members, sizeof members, row->name);
     text_quote(shown, sizeof shown, name);
-    decode_fault(decoder, pointer, value, NULL, meant, "must be one of %s, is %s", list, shown);
+    decode_fault(decoder, pointer, value, NULL, meant, "must be one of %s%s%s, is %s", list,
+                 item != NULL ? ", or an object with " : "", members, shown);
     return meant;
 }
 
@@ -238,8 +244,9 @@ static void decode_text(Decoder *decoder, const json_t *value, const Field *fiel
     *(char **)target = text;
 }
 
-static void decode_choice(Decoder *decoder, const json_t *value, const Field *field, void *target,
-                          const char *pointer) {
+// `item`: as of decode_wrong_name.
+static void decode_choice_of(Decoder *decoder, const json_t *value, const Field *field,
+                             const Field *item, void *target, const char *pointer) {
     const bool is_flag = (field->flags & FIELD_SCALARS) != 0;
     if (is_flag && json_is_boolean(value)) {
         *(int *)target = json_is_true(value);
@@ -255,7 +262,12 @@ static void decode_choice(Decoder *decoder, const json_t *value, const Field *fi
             return;
         }
     }
-    (void)decode_wrong_name(decoder, pointer, value, field->choices);
+    (void)decode_wrong_name(decoder, pointer, value, field->choices, item);
+}
+
+static void decode_choice(Decoder *decoder, const json_t *value, const Field *field, void *target,
+                          const char *pointer) {
+    decode_choice_of(decoder, value, field, NULL, target, pointer);
 }
 
 // A number that the row allows: its range is not to report it a second time.
@@ -329,7 +341,11 @@ static void decode_short(Decoder *decoder, const json_t *value, const Field *fie
                          const char *pointer) {
     size_t offset = 0;
     const Field *row = fields_find(field->fields, field->shorthand, &offset);
-    decode_field(decoder, value, row, (char *)item + offset + row->offset, pointer);
+    char *member = (char *)item + offset + row->offset;
+    if (row->kind == FIELD_KIND_CHOICE)
+        decode_choice_of(decoder, value, row, field, member, pointer);
+    else
+        decode_field(decoder, value, row, member, pointer);
 }
 
 // `key`: NULL: an element of an array, else of an object.
@@ -381,9 +397,10 @@ static void decode_list(Decoder *decoder, const json_t *value, const Field *fiel
     const bool is_object = takes_object && json_is_object(value);
     if (!json_is_array(value) && !is_number && !is_object && !is_null) {
         decode_wrong_type(decoder, pointer, value, field,
-                          takes_number   ? "a number or an array of numbers"
-                          : takes_object ? "an array or an object of strings"
-                                         : kinds[field->kind].wanted);
+                          takes_number               ? "a number or an array of numbers"
+                          : takes_object             ? "an array or an object of strings"
+                          : field->shorthand != NULL ? "an array of names"
+                                                     : kinds[field->kind].wanted);
         return;
     }
     const size_t count = is_number   ? 1
@@ -468,7 +485,7 @@ static const Kind *decode_kind(Decoder *decoder, const json_t *object, const Kin
         text_list(list, sizeof list, names[i]);
     }
     if (json_is_string(tag)) {
-        const char *meant = decode_wrong_name(decoder, place, tag, names);
+        const char *meant = decode_wrong_name(decoder, place, tag, names, NULL);
         return meant != NULL ? kind_find(kinds, meant) : NULL;
     }
     if (tag != NULL)

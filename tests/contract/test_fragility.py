@@ -112,7 +112,8 @@ def test_senseless_requests_are_refused_at_their_place():
     with program.daemon() as daemon:
         uploaded(daemon, 2)
         for members, pointer, words in (
-                ({"records": ["quake_1", "quake_9"]}, "/study/records/1/name", "quake_9"),
+                ({"records": ["quake_1", "quake_9"]}, "/study/records/1", "quake_9"),
+                ({"records": "quake_1"}, "/study/records", "must be an array of names"),
                 ({"records": ["quake_1", "quake_1"]}, "/study/records/1", "twice"),
                 ({"records": []}, "/study/records", "required"),
                 ({"levels": [1, 1]}, "/study/levels/1", "rise"),
@@ -121,7 +122,8 @@ def test_senseless_requests_are_refused_at_their_place():
                 ({"levels": 3}, "/study/levels", "must be an object or an array of numbers"),
                 ({"levels": {"from": 0, "to": 2, "count": 3}}, "/study/levels/from", "above 0"),
                 ({"levels": {"from": 1, "to": 2, "count": 6000}}, "/study/levels/count", "within"),
-                ({"intensity": "pgv"}, "/study/intensity", "pga"),
+                ({"intensity": "pgv"}, "/study/intensity",
+                 "must be one of pga, or an object with period, damping_ratio, is \"pgv\""),
                 ({"intensity": {"period": 0.45, "damping_ratio": 1}}, "/study/intensity/damping_ratio", "within"),
                 ({"limits": [{"metric": "drift", "value": 1}]}, "/study/limits/0/metric", "peak_storey_drift"),
                 ({"limits": [{"metric": "peak_displacement"}]}, "/study/limits/0/value", "required")):

@@ -97,7 +97,7 @@ def test_faults_have_the_pointers_of_the_request():
                                 ({"over": {}}, "/study/over"),
                                 ({"over": {"records": []}}, "/study/over"),
                                 ({"over": {"runs": 4}}, "/study/over/runs"),
-                                ({"over": {"records": ["none"]}}, "/study/over/records/0/name"),
+                                ({"over": {"records": ["none"]}}, "/study/over/records/0"),
                                 ({"max_candidates": 1}, "/study/max_candidates")):
             reply = daemon.submit(asked(**change))
             assert reply.status == 422, (change, reply)

@@ -220,7 +220,7 @@ TEST(faults_stand_where_the_name_or_the_digest_does) {
         {"\"name\": \"a\"", "[\"a\"]", ", \"records\": [{\"name\": \"a\", \"digest\": \"0\"}]",
          "/study/records/0/digest", ""},
         {"\"name\": \"a\"", "[\"a\"]", ", \"records\": [{\"name\": \"x\"}]",
-         "/study/records/0/name", ""},
+         "/study/records/0", ""},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char study[512] = "";
