@@ -39,7 +39,7 @@ static const char *const curve_direction_names[] = {"up", "down", "both", NULL};
 
 // clang-format off
 static const Field response_study_fields[] = {
-    FIELD_ITEM(ResponseStudy, axis, study_axis_fields, NULL, PRESENCE_REQUIRED, "the number that varies: a range of from, to and count; the exact solver is used whatever the scene's solver is"),
+    FIELD_ITEM(ResponseStudy, axis, study_axis_fields, NULL, PRESENCE_REQUIRED, "the number that varies: a range of from, to and count"),
     FIELD_CHOICE(ResponseStudy, direction, curve_direction_names, CURVE_UP, "up: from, then on to to, each point from the state of the one before; down: the reverse; both: up, then down"),
     FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic; fewer where a stable orbit is found earlier, up to three times as many where the motion has not yet left an unstable one"),
     FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CYCLE_FLOW_PERIOD), 8, "longest period searched for, in cycles of the sine"),
@@ -665,7 +665,7 @@ static void curve_free(void *of) {
 const StudyKind study_response = {
     .kind =
         {"response",
-         "steady motion under a sine while a number varies: periodic orbits and their stability",
+         "steady motion under a sine while a number varies: periodic orbits and their stability, always by the exact solver",
          response_study_fields, sizeof(ResponseStudy)},
     .answer = &(const Kind){"response", "orbits and sections at each value", response_answer_fields,
                             sizeof(ResponseCurve)},
