@@ -412,10 +412,10 @@ const Command command_get = {
             "  impactd get r-91c0 bundle -o all.zip            everything in one archive\n"
             "\n"
             "WHAT: result (default), series, psd, impacts, energy, manifest, bundle, job; of\n"
-            "studies tradeoff, ensemble, compare, sensitivity, table. Formats: json, csv,\n"
-            "npy, npz, mat, zip, svg, as far as the server has them. A file is written\n"
-            "completely or not at all. Exit code 4 if there is no such part, 8 if the job has\n"
-            "not finished after --wait.\n",
+            "studies tradeoff, ensemble, compare, sensitivity, table, calibration, response,\n"
+            "optimum, fragility. Formats: json, csv, npy, npz, mat, zip, svg, as far as the\n"
+            "server has them. A file is written completely or not at all. Exit code 4 if there\n"
+            "is no such part, 8 if the job has not finished after --wait.\n",
     .options = get_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
