@@ -329,8 +329,8 @@ typedef struct StudySettings {
     Texts record;
     int unit;
     bool json;
-    double max_cpu_seconds;
-    int metric; // of the study's own names; CHOICE_ABSENT
+    double max_cpu_seconds; // of the whole study; NAN: only each run is limited
+    int metric;             // of the study's own names; CHOICE_ABSENT
     double error, point_steps;
     uint64_t repeats;
     Texts solver;
@@ -350,6 +350,9 @@ typedef struct StudyCommand {
 #define OUTPUT_ROW(formats)                                                                        \
     FIELD_TEXTS(StudySettings, output, NULL, NULL, OUTPUTS_MAX, PRESENCE_OPTIONAL, 0,              \
                 "write to this file, " formats "; may be given again")
+#define STUDY_CPU_ROW                                                                              \
+    FIELD_REAL(StudySettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), OPTIONAL,                   \
+               "refuse a study that is predicted to need more CPU time in all (60 for each run)")
 #define JSON_ROW                                                                                   \
     FIELD_FLAG(StudySettings, json, false, "print the document, as the server sends it")
 
@@ -453,9 +456,24 @@ static Status study_choose(StudyRequest *request, StudySettings *settings, Probl
     return STATUS_OK;
 }
 
+static Status study_check_cost(const StudyRequest *request, double max,
+                               const SimulationLimits *limits, Problem *problem) {
+    Cost cost;
+    if (isnan(max))
+        return STATUS_OK;
+    TRY(study_request_cost(request, limits, &cost, problem));
+    if (cost.cpu_seconds <= max)
+        return STATUS_OK;
+    return problem_add(problem, STATUS_INVALID, "/study",
+                       "would take about %.3g s of CPU in all, at most %g s are allowed by "
+                       "--max-cpu-seconds: %s",
+                       cost.cpu_seconds, max, study_kind(request->study)->shorten);
+}
+
 static Status study_scene(const char *path, const Bytes *text, void *of, Problem *problem) {
     StudySettings *settings = of;
-    const SimulationLimits limits = scene_limits(settings->max_cpu_seconds);
+    const double max = settings->max_cpu_seconds;
+    const SimulationLimits limits = scene_limits(isnan(max) ? SIMULATION_CPU_SECONDS : max);
     const Texts *outputs = &settings->output;
     StudyRequest request;
     Warnings warnings;
@@ -465,6 +483,8 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
         status = study_choose(&request, settings, problem);
     if (status == STATUS_OK)
         status = study_request_complete(&request, &limits, NULL, problem);
+    if (status == STATUS_OK)
+        status = study_check_cost(&request, max, &limits, problem);
     if (status == STATUS_OK)
         status = study_check_outputs(study_kind(request.study), outputs, problem);
     // Before the runs, so that a wrong folder is reported at once.
@@ -495,7 +515,7 @@ static const Field study_fields[] = {
     OUTPUT_ROW(".json the whole, .csv or .npz the table or .svg the chart"),
     JSON_ROW,
     RECORD_ROWS(StudySettings),
-    CPU_ROW(StudySettings),
+    STUDY_CPU_ROW,
     FIELD_END,
 };
 
@@ -527,7 +547,7 @@ static const Field tradeoff_fields[] = {
     FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL,
                "solver steps a point may be predicted to take (5e7)"),
     RECORD_ROWS(StudySettings),
-    CPU_ROW(StudySettings),
+    STUDY_CPU_ROW,
     FIELD_END,
 };
 
@@ -594,7 +614,7 @@ static const Field ensemble_fields[] = {
         "rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear "
         "or psd"),
     RECORD_ROWS(StudySettings),
-    CPU_ROW(StudySettings),
+    STUDY_CPU_ROW,
     FIELD_END,
 };
 
@@ -665,7 +685,7 @@ static const Field sweep_fields[] = {
     OUTPUT_ROW(".json, .csv, .npy, .npz or .mat the table or .svg the chart"),
     JSON_ROW,
     RECORD_ROWS(StudySettings),
-    CPU_ROW(StudySettings),
+    STUDY_CPU_ROW,
     FIELD_END,
 };
 
@@ -796,7 +816,9 @@ const Command command_optimize = {
     STUDY_COMMAND("optimize", &study_optimize, NULL, optimize_add),
     .summary = "values of members of a scene that make a metric best, under constraints",
     .help =
-        DESIGN_HELP("optimize", "", "the best values, their gain and their rivals",
+        DESIGN_HELP("optimize", "",
+                    "the best values, their gain and their rivals; of two objectives the best\n"
+                    "        compromise, the nearest to the best values of both, and the front",
                     "\"objectives\": [{\"metric\": \"rms_displacement\"}],\n"
                     "    \"variables\": [{\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, "
                     "\"to\": 0.03}],\n"

@@ -208,6 +208,9 @@ def test_what_takes_too_long_is_refused_in_seconds():
         code, _, errors = program.run(command, "-", "--max-cpu-seconds", "1e-6", text=json.dumps(
             {**program.scene("paper_free_sponge"), "output": {"psd": None}}))
         assert code == 3 and "/duration: would take about" in errors and "at most 1e-06 s" in errors, errors
+    study = json.dumps(program.scene("optimize_clearance"))
+    code, _, errors = program.run("optimize", "-", "--max-cpu-seconds", "0.1", text=study)
+    assert code == 3 and "/study: would take about" in errors and "at most 0.1 s are allowed by --max-cpu" in errors, errors
     stalled = {"structure": {"mass": 25696, "stiffness": 3134636, "damping": 9082}, "sample_rate": 9, "duration": 6,
                "dampers": [{"mass": mass, "clearance": 0, "buffer": {"restitution": 0.2, "contact_time": 5e-8}}
                            for mass in (0.03, 18)],
