@@ -1,6 +1,7 @@
 // The revision of a material that a calibration proposes, which nothing writes until a user sends
 // it back: restitution and contact time of one damper's buffer, as fitted.
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -83,6 +84,34 @@ static Status calibration_describe(const Material *head, const char *result,
     return status_made(text_format(&material->source, "calibration %s", result));
 }
 
+// That no buffer has both numbers.
+static Status calibration_refuse_buffer(const Calibration *calibration, uint64_t damper,
+                                        bool has_restitution, Problem *problem) {
+    char owner[40] = "a damper", fitted[300] = "";
+    if (damper > 0)
+        snprintf(owner, sizeof owner, "damper %llu", (unsigned long long)damper);
+    for (size_t i = 0; i < calibration->parameters.count; i++)
+        text_list(fitted, sizeof fitted, calibration->parameters.at[i].member.pointer);
+    return problem_set(problem, STATUS_CONFLICT,
+                       "the calibration did not fit the %s of a buffer of %s, it fitted %s: a "
+                       "proposal needs the restitution and the contact_time of one buffer",
+                       has_restitution ? "contact time" : "restitution", owner, fitted);
+}
+
+// That both numbers of another damper were fitted too, where the request names none.
+static Status calibration_warn_choice(const Calibration *calibration,
+                                      const CalibratedParameter *taken, Warnings *warnings) {
+    const CalibratedParameter *restitution, *contact_time;
+    for (uint64_t damper = 1; damper <= SCENE_DAMPERS; damper++) {
+        calibration_find(calibration, damper, &restitution, &contact_time);
+        if (contact_time != NULL && restitution != taken)
+            return warnings_add(
+                warnings, "/revision", "is of %s; %s was fitted too: choose it with damper=%llu",
+                taken->member.pointer, restitution->member.pointer, (unsigned long long)damper);
+    }
+    return STATUS_OK;
+}
+
 // A fitted number that is far from that of the head may be another material's.
 static Status calibration_compare(const CalibratedParameter *fitted, double head, double deviation,
                                   const char *pointer, Warnings *warnings) {
@@ -103,17 +132,15 @@ static Status calibration_write(const MaterialRevision *head, const ResultRow *r
     const CalibratedParameter *restitution, *contact_time;
     calibration_find(calibration, damper, &restitution, &contact_time);
     if (restitution == NULL || contact_time == NULL)
-        return problem_set(problem, STATUS_CONFLICT,
-                           "the calibration did not fit %s of a damper's buffer: a proposal needs "
-                           "its restitution and its contact_time",
-                           restitution == NULL ? "the restitution" : "the contact time");
+        return calibration_refuse_buffer(calibration, damper, restitution != NULL, problem);
     const char *why = calibration_refuse(calibration, restitution, contact_time);
     const char *base = base_path();
     Material material = {.name = NULL};
     Warnings warnings = {NULL, 0};
-    Status status = STATUS_OK;
+    Status status =
+        damper > 0 ? STATUS_OK : calibration_warn_choice(calibration, restitution, &warnings);
     bytes_json(bytes, "{\"slug\": %s, \"result\": %s, \"revision\": ", head->slug, row->id);
-    if (why == NULL) { // as POST to /revisions takes it
+    if (status == STATUS_OK && why == NULL) { // as POST to /revisions takes it
         status =
             calibration_describe(&head->material, row->id, restitution, contact_time, &material);
         bytes_text(bytes, "{");
@@ -153,12 +180,17 @@ static Status calibration_write(const MaterialRevision *head, const ResultRow *r
 
 Status calibrations_propose(App *app, const Request *request, Reply *reply, Problem *problem) {
     const char *slug = request_query(request, "material");
-    double damper;
-    if (slug == NULL || !material_slug_is_valid(slug))
+    size_t damper;
+    if (slug != NULL && !material_slug_is_valid(slug))
+        return problem_set(problem, STATUS_USAGE,
+                           "the query parameter \"material\" must be a slug without a revision, is "
+                           "\"%.80s\"",
+                           slug);
+    if (slug == NULL)
         return problem_set(problem, STATUS_USAGE,
                            "the query parameter \"material\" is required: the slug of the material "
                            "that gets the revision");
-    TRY(request_number(request, "damper", 0, SCENE_DAMPERS, 0, &damper, problem));
+    TRY(request_count(request, "damper", 1, SCENE_DAMPERS, 0, &damper, problem)); // 0: any
     ResultRow row = {0};
     StudyAnswer answer = {NULL};
     MaterialRevision head = {.slug = NULL};
@@ -172,7 +204,7 @@ Status calibrations_propose(App *app, const Request *request, Reply *reply, Prob
         status = material_latest(app, slug, &head, problem);
     if (status == STATUS_OK)
         status = calibration_write(&head, &row, (const Calibration *)(const void *)answer.study,
-                                   (uint64_t)damper, &bytes, problem);
+                                   damper, &bytes, problem);
     if (status == STATUS_OK) {
         // For If-Match of the POST that confirms it.
         material_tag(slug, state.latest, state.version, tag);

@@ -53,6 +53,25 @@ def test_a_calibration_becomes_a_revision_of_a_material():
         proposal = daemon.request("POST", f"/v1/results/{result}/calibration/proposal?material=sponge").json()
         assert "/dampers/0/right_buffer/restitution" in proposal["revision"]["comment"], proposal
         assert "/dampers/0/right_buffer/contact_time" in proposal["revision"]["comment"], proposal
+        for query, status, words in (
+                ("material=sponge&damper=3", 409, "the restitution of a buffer of damper 3, it fitted /dampers/0/left_buffer/"),
+                ("material=sponge&damper=0", 400, "within [1, "), ("material=sponge&damper=1.5", 400, "whole number"),
+                ("material=sponge@1", 400, "a slug without a revision"), ("damper=1", 400, "is required")):
+            refused = daemon.request("POST", f"/v1/results/{result}/calibration/proposal?{query}")
+            assert refused.status == status and words in refused.json()["detail"], (query, refused)
+        # Of two dampers the first one is taken, and the other one named.
+        two = json.loads(json.dumps(scene))
+        two["dampers"].append({**two["dampers"][0], "mass": 1e-6})
+        two["study"]["measured"][0]["channel"] = "displacement_1"
+        two["study"] = {**two["study"], "starts": 1, "parameters": [
+            {**one, "pointer": one["pointer"].replace("/0/", f"/{at}/")} for at in (0, 1) for one in scene["study"]["parameters"]]}
+        both = program.finished(daemon, two)["result"]
+        warnings = [[warning["detail"] for warning in daemon.request(
+            "POST", f"/v1/results/{both}/calibration/proposal?material=sponge{query}").json()["warnings"]]
+                    for query in ("", "&damper=2")]
+        assert warnings[0][0] == ("is of /dampers/0/buffer/restitution; /dampers/1/buffer/restitution was fitted too: "
+                                  "choose it with damper=2"), warnings
+        assert not any("was fitted too" in detail for detail in warnings[1]), warnings
         other = daemon.get(f"/v1/results/{result}/optimum.json")
         assert other.status == 404 and 'for the study "calibrate", not for "optimize": its answer is calibration.json' in other.json()["detail"], other
         newest = daemon.get("/v1/materials/sponge@2").json()
