@@ -11,7 +11,9 @@
 
 enum { SAMPLES_MIN = 16, SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000, LAGS = 20 };
 
-static const double structured = 0.05;   // of the motion: rms of residuals that is not explained
+static const double structured = 0.05; // of the motion: rms of residuals that is not explained
+// Correlation of neighbouring residuals that are not noise, and the same in standard errors.
+static const double smooth_min = 0.2, smooth_errors = 4;
 static const double rms_min = 1e-100;    // of samples and noise: squares of less underflow
 static const double spectrum_misfit = 2; // of the expected variance: spectra that differ
 
@@ -363,6 +365,17 @@ static Status calibrate_check_spectrum(CalibrateWork *work, const MeasuredTarget
         residual->deviation * sqrt(expected)));
 }
 
+// Whether residuals differ less from one to the next than those of noise do: the mean square of
+// these differences is 2 (1 - r) times the variance, of noise with |r| of 1 / sqrt(count) (von
+// Neumann 1941).
+static bool calibrate_is_smooth(const double *residual, size_t count) {
+    double differences = 0;
+    for (size_t i = 1; i < count; i++)
+        differences += (residual[i] - residual[i - 1]) * (residual[i] - residual[i - 1]);
+    const double correlation = 1 - differences / (2 * calibrate_sum_squares(residual, count));
+    return correlation > fmax(smooth_min, smooth_errors / sqrt((double)count));
+}
+
 // The sentence if the model does not explain a channel, whose noise was not given.
 static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
     Calibration *answer = work->answer;
@@ -377,13 +390,15 @@ static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
                                        "the differences of %s from the best fit, %.2g %s rms, are "
                                        "as large as the measured motion, %.2g %s rms",
                                        name, rms, unit, motion, unit));
-    if (!calibrate_is_correlated(work->starts[0].residual + target->place, target->values.count))
+    const double *own = work->starts[0].residual + target->place;
+    if (!calibrate_is_correlated(own, target->values.count))
         return STATUS_OK;
-    if (rms >= structured * motion)
+    if (rms >= structured * motion || calibrate_is_smooth(own, target->values.count))
         return status_made(text_format(
             &answer->detail,
             "the differences of %s from the best fit, %.2g %s rms or %.2g %% of the motion, are "
-            "correlated in time, which noise is not",
+            "correlated in time, which noise is not: with a deviation that includes the model's "
+            "own error the fit is judged by that",
             name, rms, unit, 100 * rms / motion));
     return warnings_add(&answer->made.warnings, json_pointer_at("/study/measured", c).at,
                         "the differences of %s from the fit, %.2g %s rms, are correlated in time: "

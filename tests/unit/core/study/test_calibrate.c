@@ -240,6 +240,25 @@ TEST(a_model_without_the_damper_does_not_explain_a_motion_with_it) {
     study_request_clear(&request);
 }
 
+TEST(residuals_that_are_no_noise_are_not_explained_unless_a_deviation_includes_them) {
+    StudyRequest request = request_make();
+    MeasuredChannel *measured = measure(&request, &request.simulation, 0.002);
+    const double deviation = 10 * measured->deviation;
+    measured->deviation = (double)NAN;
+    request.simulation.scene.dampers.at[0].clearance *= 1.02; // the model's own error
+    study_of(&request)->starts = 2;
+    parameter_add(&request, "/structure/stiffness", 700, 1000);
+    Calibration *answer = calibrate(&request);
+    assert_int_equal(answer->verdict, CALIBRATE_NOT_EXPLAINED);
+    assert_non_null(strstr(answer->detail, "a deviation that includes the model's own error"));
+    variant_free(&answer->variant);
+    study_of(&request)->measured.at[0].deviation = deviation;
+    answer = calibrate(&request);
+    assert_int_equal(answer->verdict, CALIBRATE_EXPLAINED);
+    variant_free(&answer->variant);
+    study_request_clear(&request);
+}
+
 TEST(spectra_are_fitted_on_request) {
     StudyRequest request = request_make();
     request.simulation.scene.duration = 8;
