@@ -53,7 +53,7 @@ typedef struct CalibratedParameter {
     char *unit;
     double value, standard_error; // in `unit`, as the next
     Reals interval_95;
-    bool is_identifiable;
+    int identifiable; // 0, 1 or CHOICE_ABSENT
 } CalibratedParameter;
 
 typedef struct CalibratedParameters {

@@ -48,7 +48,7 @@ static const Field calibrated_parameter_fields[] = {
     FIELD_REAL(CalibratedParameter, value, NULL, ANY, OPTIONAL, "fitted"),
     FIELD_REAL(CalibratedParameter, standard_error, NULL, ANY, OPTIONAL, "standard deviation of the fitted value in its valley; null if the interval is as wide as the range or the verdict is not_explained"),
     FIELD_REALS_OR_NULL(CalibratedParameter, interval_95, NULL, "95 % confidence interval"),
-    {.name = "identifiable", .kind = FIELD_KIND_FLAG, .offset = FIELD_AT(CalibratedParameter, is_identifiable, bool), .presence = PRESENCE_DEFAULT, .doc = "the measured motions determine it within its range"},
+    FIELD_FLAG_OR_NULL(CalibratedParameter, identifiable, "the measured motions determine it within its range; null if the verdict is not_explained"),
     FIELD_END
 };
 
@@ -252,13 +252,16 @@ static Status calibrate_report_parameter(CalibrateWork *work, size_t i, const ch
     CalibratedParameter *parameter = list_append(&work->answer->parameters, sizeof *parameter);
     TRY(status_made(parameter != NULL));
     parameter->value = parameter->standard_error = (double)NAN;
+    parameter->identifiable = CHOICE_ABSENT;
     TRY(study_axis_member(axis, &parameter->member));
     TRY(text_copy(unit, &parameter->unit));
     if (work->start_count == 0)
         return STATUS_OK;
     parameter->value = calibrate_value(axis, work->starts[0].fit.at[i]);
-    parameter->is_identifiable = found->reasons[i] == UNDETERMINED_NOT;
-    if (found->reasons[i] == UNDETERMINED_WIDE || work->answer->verdict == CALIBRATE_NOT_EXPLAINED)
+    if (work->answer->verdict == CALIBRATE_NOT_EXPLAINED)
+        return STATUS_OK;
+    parameter->identifiable = found->reasons[i] == UNDETERMINED_NOT;
+    if (found->reasons[i] == UNDETERMINED_WIDE)
         return STATUS_OK;
     parameter->standard_error =
         found->errors[i] * (calibrate_is_logarithmic(axis)

@@ -55,9 +55,9 @@ static const char *calibration_refuse(const Calibration *calibration,
                                       const CalibratedParameter *contact_time) {
     if (calibration->verdict == CALIBRATE_NOT_EXPLAINED)
         return "the fitted scene does not explain the measured motions";
-    if (!restitution->is_identifiable)
+    if (!restitution->identifiable)
         return "the measured motions do not determine the restitution";
-    if (!contact_time->is_identifiable)
+    if (!contact_time->identifiable)
         return "the measured motions do not determine the contact time";
     return NULL;
 }

@@ -14,9 +14,9 @@ static const char *calibration_parameter_text(Chart *chart, const CalibratedPara
     const char *space = unit[0] != '\0' ? " " : "";
     if (isnan(parameter->value))
         return chart_text(chart, "%.80s is unknown", parameter->member.pointer);
-    if (interval->count != 2 || !parameter->is_identifiable)
+    if (interval->count != 2 || !parameter->identifiable)
         return chart_text(chart, "%.80s = %.4g%s%s%s", parameter->member.pointer, parameter->value,
-                          space, unit, parameter->is_identifiable ? "" : " (not determined)");
+                          space, unit, parameter->identifiable ? "" : " (not determined)");
     return chart_text(chart, "%.80s = %.4g%s%s (%.4g to %.4g)", parameter->member.pointer,
                       parameter->value, space, unit, interval->at[0], interval->at[1]);
 }
@@ -89,6 +89,8 @@ void calibration_table(const Variant *answer, StudyTable *table) {
         study_table_number(table, "standard_error", NULL, parameter->standard_error);
         study_table_number(table, "low", NULL, has_interval ? interval->at[0] : (double)NAN);
         study_table_number(table, "high", NULL, has_interval ? interval->at[1] : (double)NAN);
-        study_table_text(table, "identifiable", parameter->is_identifiable ? "true" : "false");
+        study_table_text(
+            table, "identifiable",
+            parameter->identifiable == CHOICE_ABSENT ? NULL : field_flags[parameter->identifiable]);
     }
 }

@@ -364,7 +364,7 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
     bool is_lost = false, is_all_identified = true;
     for (size_t i = 0; i < trial->count; i++) {
         const CalibratedParameter *parameter = &answer->parameters.at[i];
-        is_all_identified &= parameter->is_identifiable;
+        is_all_identified &= parameter->identifiable == 1;
         if (!is_determined || parameter->interval_95.count != 2)
             continue;
         const bool is_contained = parameter->interval_95.at[0] <= trial->truth[i] &&

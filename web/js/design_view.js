@@ -24,7 +24,7 @@ const parts = {
       front.map((one) => ({ ...one, ...one.objectives })))],
   calibrate: ({ parameters, detail, residual_rms: residuals }) => [lesson(detail),
     table("Parameters", [place, value("Value", "value"), value("Standard error", "standard_error"), range("interval_95"),
-      text("Identifiable", ({ identifiable }) => (identifiable ? "yes" : "no"))], parameters),
+      text("Identifiable", ({ identifiable }) => ({ true: "yes", false: "no" })[identifiable] ?? null)], parameters),
     residuals && table("Residuals", [text("Channel", ({ channel }) => words(channel)), value("RMS", "value")], residuals)],
   response: ({ points, unit }) => [table("Points", [value("Value", "value", unit),
     text("Direction", ({ direction }) => direction ?? "continuation"), text("Period [cycles]", ({ period }) => period),

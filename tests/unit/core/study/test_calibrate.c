@@ -108,7 +108,7 @@ static Calibration *calibrate_failing(StudyRequest *request, FailingRuns fails) 
 }
 
 static void assert_contains(const CalibratedParameter *parameter, double truth) {
-    if (!parameter->is_identifiable || !(parameter->interval_95.at[0] <= truth) ||
+    if (parameter->identifiable != 1 || !(parameter->interval_95.at[0] <= truth) ||
         !(truth <= parameter->interval_95.at[1]))
         fail_msg("%s: %g +- %g, true %g", parameter->member.pointer, parameter->value,
                  parameter->standard_error, truth);
@@ -221,7 +221,7 @@ TEST(parameters_of_which_only_a_ratio_matters_are_not_identifiable) {
     Calibration *answer = calibrate(&request);
     assert_int_equal(answer->verdict, CALIBRATE_NOT_IDENTIFIABLE);
     assert_non_null(strstr(answer->detail, "/structure/mass"));
-    assert_true(!answer->parameters.at[0].is_identifiable &&
+    assert_true(answer->parameters.at[0].identifiable == 0 &&
                 isnan(answer->parameters.at[0].standard_error));
     variant_free(&answer->variant);
     study_request_clear(&request);
@@ -236,6 +236,7 @@ TEST(a_model_without_the_damper_does_not_explain_a_motion_with_it) {
     Calibration *answer = calibrate(&request);
     assert_int_equal(answer->verdict, CALIBRATE_NOT_EXPLAINED);
     assert_non_null(strstr(answer->detail, "chi square"));
+    assert_int_equal(answer->parameters.at[0].identifiable, CHOICE_ABSENT);
     variant_free(&answer->variant);
     study_request_clear(&request);
 }
