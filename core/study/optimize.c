@@ -792,8 +792,8 @@ static Status optimum_warn_infeasible(const OptimizeWork *work) {
     const OptimizeResult *own = &work->result[worst];
     return warnings_add(
         warnings, json_pointer_at("/study/constraints", own->constraint).at,
-        "no candidate keeps all constraints: the nearest one, candidate %zu, has %s %s, which must "
-        "be at %s %s",
+        "no candidate keeps all constraints: the nearest one, relative to the bounds, is candidate "
+        "%zu with %s %s, which must be at %s %s",
         least, study_metric_names[own->metric], real_text(work->metrics[least].of[own->metric]).at,
         own->sign < 0 ? "least" : "most", real_text(own->bound).at);
 }
