@@ -14,8 +14,10 @@ enum { SAMPLES_MIN = 16, SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000, LAGS =
 static const double structured = 0.05; // of the motion: rms of residuals that is not explained
 // Correlation of neighbouring residuals that are not noise, and the same in standard errors.
 static const double smooth_min = 0.2, smooth_errors = 4;
-static const double rms_min = 1e-100;    // of samples and noise: squares of less underflow
-static const double spectrum_misfit = 2; // of the expected variance: spectra that differ
+static const double rms_min = 1e-100; // of samples and noise: squares of less underflow
+// Of the expected variance: spectra that differ. Those of chaotic motions scatter more than those
+// of noise: few strong impacts make most of them.
+static const double spectrum_misfit = 2, spectrum_misfit_chaos = 9;
 
 const char *const calibrate_fit_names[] = {"time", "psd", NULL};
 const char *const calibrate_verdict_names[] = {"explained", "not_explained", "not_identifiable",
@@ -358,7 +360,8 @@ static Status calibrate_check_spectrum(CalibrateWork *work, const MeasuredTarget
     const double expected = work->is_chaotic ? 2 : 1;
     const double freedom = fmax(bins / calibrate_correlated_bins, 1);
     const double scatter = calibrate_chi_square(freedom, calibrate_quantile_999) / freedom;
-    if (squares <= fmax(spectrum_misfit, scatter) * expected * bins)
+    const double misfit = work->is_chaotic ? spectrum_misfit_chaos : spectrum_misfit;
+    if (squares <= fmax(misfit, scatter) * expected * bins)
         return STATUS_OK;
     return status_made(text_format(
         &work->answer->detail,
