@@ -124,6 +124,7 @@ TEST(points_that_may_still_be_transients_are_named) {
 
 TEST(a_resonance_without_damping_is_named) {
     StudyRequest request = request_make(3);
+    simulation_clear(&request.simulation);
     scene_without_damper(&request.simulation);
     paper_sine(&request.simulation, 1, 3);
     SdofStructure *structure = (SdofStructure *)(void *)request.simulation.scene.structure;
