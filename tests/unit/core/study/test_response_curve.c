@@ -34,6 +34,14 @@ static void axis_set(const StudyRequest *request, const char *pointer, double fr
     axis->count = count;
 }
 
+// The pointer of the axis becomes the first of tied ones.
+static void axis_tie(const StudyRequest *request) {
+    StudyAxis *axis = &study_of(request)->axis;
+    assert_int_equal(texts_append(&axis->pointers, axis->pointer), STATUS_OK);
+    free(axis->pointer);
+    axis->pointer = NULL;
+}
+
 // Clears the request. The answer is freed by variant_free.
 static ResponseCurve *curve_of(StudyRequest *request) {
     Variant *answer = NULL;
@@ -214,11 +222,9 @@ TEST(the_cost_does_not_depend_on_the_solver) {
 TEST(all_tied_members_are_named) {
     StudyRequest request = request_make(4);
     axis_set(&request, "/dampers/0/clearance", 0.01, 0.011, 2);
-    StudyAxis *axis = &study_of(&request)->axis;
-    assert_int_equal(texts_append(&axis->pointers, axis->pointer), STATUS_OK);
-    assert_int_equal(texts_append(&axis->pointers, "/structure/damping"), STATUS_OK);
-    free(axis->pointer);
-    axis->pointer = NULL;
+    axis_tie(&request);
+    assert_int_equal(texts_append(&study_of(&request)->axis.pointers, "/structure/damping"),
+                     STATUS_OK);
     ResponseCurve *curve = curve_of(&request);
     assert_string_equal(curve->member.pointer, "/dampers/0/clearance");
     assert_int_equal(curve->member.pointers.count, 2);
@@ -232,12 +238,8 @@ TEST(the_cost_of_tied_members_is_that_of_their_frequency) {
         StudyRequest request = request_make(4);
         Cost cost;
         axis_set(&request, "/excitation/frequency", 0.01, 0.02, 5);
-        StudyAxis *axis = &study_of(&request)->axis;
-        if (i == 1) {
-            assert_int_equal(texts_append(&axis->pointers, axis->pointer), STATUS_OK);
-            free(axis->pointer);
-            axis->pointer = NULL;
-        }
+        if (i == 1)
+            axis_tie(&request);
         assert_int_equal(study_request_complete(&request, NULL, NULL, &problem), STATUS_OK);
         assert_int_equal(study_request_cost(&request, NULL, &cost, NULL), STATUS_OK);
         steps[i] = cost.steps;
