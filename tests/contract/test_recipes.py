@@ -1,139 +1,280 @@
 #!/usr/bin/env python3
-"""The README's recipes for scripts run as they stand there, against a daemon."""
+"""Every code block of README.md and web/guide/*.md runs as printed.
 
+Each page has a daemon and a temporary folder of its own. The folder holds scene.json, the paper's free
+sponge. The blocks of a page run in their order, and each language keeps its variables from block to block,
+as a terminal does. The words after the opening ``` say what a block is:
+
+    sh, console    bash runs it (of console: the lines after "$ "); a command that fails fails the page
+    python, octave Debian's python3 and octave-cli run it
+    json           a scene or a study (the daemon validates it), or another body of a request (its schema)
+    json fragment  members of a document; must be JSON, with "..." anywhere it is only shown
+    text output    the output of the block before; "..." or an ellipsis stands for any text
+    LANGUAGE NAME  a word with a dot, such as tower.json: the block is also saved as this file
+    ... not-run    shown only; a reason may follow. Other languages and `text` are shown only, too
+
+http://127.0.0.1:8080 and localhost:8080 become the address of the page's daemon; IMPACTD_SERVER is that
+address and impactd is on PATH. `test_recipes.py scripting` runs one page."""
+
+import glob
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 
-import numpy
+import jsonschema
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from asking import endless  # noqa: E402
 
-USUAL = "http://127.0.0.1:8080"
+MAX_SECONDS = 60  # of one block
+PAGES = ["README.md", *sorted(os.path.relpath(path, program.SOURCE)
+                              for path in glob.glob(os.path.join(program.SOURCE, "web", "guide", "*.md")))]
+# Bodies of requests that are not scenes.
+SCHEMAS = ["new_material", "material_revision", "material_revert", "material_review", "measurement"]
+DONE = "--block-done--"
+# Reads the names of files with a block from standard input and runs each in one namespace.
+PYTHON = f"""
+import sys
+sys.path.insert(0, "")
+names = {{"__name__": "__main__"}}
+for path in iter(sys.stdin.readline, ""):
+    with open(path.strip()) as file:
+        exec(compile(file.read(), path.strip(), "exec"), names)
+    print("{DONE}", flush=True)
+"""
+# Command of an interpreter, and the line that makes it run a file and report the end.
+INTERPRETERS = {
+    "sh": (["bash", "-c", f"""set -Eeuo pipefail; exec 3<&0
+trap 'echo "line $LINENO: $BASH_COMMAND: exit code $?"' ERR
+while read -r path <&3; do . "$path" </dev/null; echo "{DONE}"; done"""], "{0}\n"),
+    "python": (["/usr/bin/python3", "-c", PYTHON], "{0}\n"),
+    "octave": (["octave-cli", "--no-init-file", "--quiet"], f"source('{{0}}'); printf('{DONE}\\n'); fflush(stdout);\n"),
+}
+INTERPRETERS["console"] = INTERPRETERS["sh"]
 
 
-def recipe(language):
-    """The one fenced block of that language in the README."""
-    with open(os.path.join(program.SOURCE, "README.md"), encoding="utf-8") as file:
-        found = re.findall(rf"^```{language}\n(.*?)^```$", file.read(), re.M | re.S)
-    assert len(found) == 1, (language, len(found))
-    return found[0]
+class Block:
+    """A fenced code block: its language, the words after it, its text and the line where the text begins."""
+
+    def __init__(self, info, text, line):
+        self.language, *self.words = info.split() or [""]
+        self.text, self.line = text, line
+        self.is_run = not any(word.startswith("not-run") for word in self.words)
+        self.file = next((word for word in self.words if re.fullmatch(r"[\w-]+(\.\w+)+", word)), None)
 
 
-def cook(language, *command, ending):
-    """Runs a recipe in a folder with the scene in it; its output, and the numbers of the files it leaves."""
-    if shutil.which(command[0]) is None:
-        raise program.Skipped(f"{command[0]} is not here")
-    with program.daemon() as daemon, tempfile.TemporaryDirectory() as folder:
+def blocks(path):
+    """All fenced blocks of a page."""
+    found, opened = [], None
+    with open(os.path.join(program.SOURCE, path), encoding="utf-8") as file:
+        for number, line in enumerate(file, 1):
+            fence = re.match(r"(`{3,})(.*)$", line)
+            if opened is None and fence:
+                opened = (fence[1], fence[2].strip(), number + 1, [])
+            elif opened and fence and fence[1] == opened[0] and not fence[2].strip():
+                found.append(Block(opened[1], "".join(opened[3]), opened[2]))
+                opened = None
+            elif opened:
+                opened[3].append(line)
+    assert opened is None, f"{path}:{opened[2]}: the block is not closed"
+    return found
+
+
+def hidden_commands(path):
+    """Lines of indented blocks that look like commands: no test would run them."""
+    with open(os.path.join(program.SOURCE, path), encoding="utf-8") as file:
+        text = re.sub(r"^```.*?^```$", lambda whole: "\n" * whole[0].count("\n"), file.read(), flags=re.M | re.S)
+    return [number for number, line in enumerate(text.split("\n"), 1)
+            if re.match(r"(?: {4,}|\t)(?:\$ )?(?:curl|impactd|systemctl|sudo|apt|cmake|[\w./]+\.sh) ", line)]
+
+
+def commands(block):
+    """What bash runs of a block of sh or console, line by line as on the page."""
+    if block.language != "console":
+        return block.text
+    kept, is_command = [], False
+    for line in block.text.split("\n"):
+        if line.startswith("$ ") or (is_command and line.startswith("> ")):
+            kept.append(line[2:])
+            is_command = True
+        else:
+            kept.append("")
+            is_command = False
+    return "\n".join(kept)
+
+
+class Page:
+    """A page's folder, daemon and interpreters while its blocks run."""
+
+    def __init__(self, path, daemon, folder):
+        self.path, self.daemon, self.folder = path, daemon, folder
+        self.interpreters = {}
+        self.output = ""  # of the last block that ran
+        self.environment = {**os.environ, "IMPACTD_SERVER": daemon.url, "HOME": folder, "XDG_STATE_HOME": folder,
+                            "PATH": program.build + os.pathsep + os.environ["PATH"], "MPLBACKEND": "Agg", "LC_ALL": "C.UTF-8"}
+        self.environment.pop("IMPACTD_TOKEN", None)
         shutil.copy(os.path.join(program.EXAMPLES, "paper_free_sponge.json"), os.path.join(folder, "scene.json"))
-        path = os.path.join(folder, "recipe" + ending)
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(recipe(language).replace(USUAL, daemon.url))
-        done = subprocess.run([*command, path], cwd=folder, capture_output=True, text=True, timeout=200, check=False,
-                              env={**os.environ, "IMPACTD_SERVER": daemon.url, "HOME": folder,
-                                   "PATH": program.build + os.pathsep + os.environ["PATH"]})
-        assert done.returncode == 0, done
-        tables = {name: numpy.loadtxt(os.path.join(folder, name), delimiter=",", skiprows=1)
-                  for name in os.listdir(folder) if name.endswith(".csv")}
-        result = program.finished(daemon, program.scene("paper_free_sponge"))["result"]
-        whole = numpy.loadtxt(daemon.get(f"/v1/results/{result}/series.csv").body.decode().splitlines(),
-                              delimiter=",", skiprows=1)
-        psd = numpy.loadtxt(daemon.get(f"/v1/results/{result}/psd.csv").body.decode().splitlines(),
-                            delimiter=",", skiprows=1)
-    return done.stdout, tables, whole, psd
+
+    def here(self, text):
+        """The text with the address of this page's daemon."""
+        return re.sub(r"(127\.0\.0\.1|localhost):8080", rf"\1:{self.daemon.port}", text)
+
+    def interpreter(self, language):
+        command, ask = INTERPRETERS[language]
+        key = command[0]
+        if key not in self.interpreters:
+            if shutil.which(key) is None:
+                raise program.Skipped(f"{key} is not here")
+            self.interpreters[key] = subprocess.Popen(command, cwd=self.folder, env=self.environment, text=True, stdin=subprocess.PIPE,
+                                                      stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+        return self.interpreters[key], ask
+
+    def run(self, block):
+        """Runs a block; the reason of its failure, or None."""
+        process, ask = self.interpreter(block.language)
+        name = f"{os.path.basename(self.path)}.{block.language}"
+        with open(os.path.join(self.folder, name), "w", encoding="utf-8") as file:
+            file.write("\n" * (block.line - 1) + self.here(commands(block)))
+        timer = threading.Timer(MAX_SECONDS, os.killpg, (process.pid, signal.SIGKILL))
+        timer.start()
+        try:
+            process.stdin.write(ask.format(name))
+            process.stdin.flush()
+            lines = []
+            for line in process.stdout:
+                if line.rstrip("\n").endswith(DONE):
+                    self.output = "".join(lines) + line.rstrip("\n")[:-len(DONE)]
+                    return None
+                lines.append(line)
+        finally:
+            timer.cancel()
+        code = process.wait()
+        if code == -signal.SIGKILL:
+            return f"takes more than {MAX_SECONDS} s"
+        return f"exit code {code}:\n" + "".join(lines[-30:])
+
+    def validate(self, block):
+        """What is wrong with a block of JSON, or None."""
+        try:
+            if "fragment" in block.words:
+                if "..." in block.text or "…" in block.text:
+                    return None
+                text = block.text.strip().rstrip(",")
+                json.loads(text if text[0] in "[{" else "{" + text + "}")
+                return None
+            document = json.loads(block.text)
+        except ValueError as error:
+            return f"not JSON: {error}"
+        if "structure" in document:
+            reply = self.daemon.request("POST", "/v1/jobs?dry_run=1", json=document)
+            return None if reply.status == 200 else json.dumps(reply.json(), indent=1)
+        faults = []
+        for name in SCHEMAS:
+            with open(os.path.join(program.SOURCE, "schema", name + ".schema.json"), encoding="utf-8") as file:
+                try:
+                    jsonschema.validate(document, json.load(file))
+                    return None
+                except jsonschema.ValidationError as error:
+                    faults.append(f"{name}: {error.message}")
+        return "neither a scene nor another body (a part of a document is a `json fragment`):\n" + "\n".join(faults)
+
+    def compare(self, block):
+        """How the output differs from a block of expected output, or None."""
+        if self.output is None:
+            return "the block before was not run"
+        parts = re.split(r"\.\.\.|…", self.here(block.text).strip())
+        if re.fullmatch(".*?".join(re.escape(part) for part in parts), self.output.strip(), re.S):
+            return None
+        return f"the output is not the printed one but:\n{self.output}"
+
+    def block(self, block):
+        """What is wrong with a block, or None."""
+        if block.file:
+            with open(os.path.join(self.folder, block.file), "w", encoding="utf-8") as file:
+                file.write(block.text)
+        if not block.is_run:
+            self.output = None
+            return None
+        if block.language in INTERPRETERS:
+            return self.run(block)
+        if block.language == "json":
+            return self.validate(block)
+        if block.language == "text" and "output" in block.words:
+            return self.compare(block)
+        return None
+
+    def close(self):
+        for process in self.interpreters.values():
+            process.stdin.close()
+            try:
+                process.wait(10)
+            finally:
+                if process.poll() is None:
+                    os.killpg(process.pid, signal.SIGKILL)
+                    process.wait()
+                process.stdout.close()
 
 
-def test_curl():
-    """The recipe for curl brings series, spectra and the largest force."""
-    out, tables, whole, psd = cook("sh", "sh", "-eu", ending=".sh")
-    assert tables["motion.csv"].shape == (2001, 3) and numpy.array_equal(tables["motion.csv"][:, 1], whole[:2001, 1])
-    assert numpy.array_equal(tables["psd.csv"], psd)
-    assert 5 < float(out.split()[-1]) < 6, out
+def check(path):
+    """Runs a page; the first block that fails ends it, for those after it may need what it makes."""
+    hidden = [] if path == "README.md" else hidden_commands(path)
+    assert not hidden, f"{path}:{hidden[0]}: commands belong in a ```sh block"
+    found = blocks(path)
+    if not any(block.is_run and block.language in (*INTERPRETERS, "json", "text") for block in found):
+        return
+    with program.daemon() as daemon, tempfile.TemporaryDirectory() as folder:
+        page = Page(path, daemon, folder)
+        try:
+            for block in found:
+                fault = page.block(block)
+                assert fault is None, f"{path}:{block.line}: ```{block.language} {fault}"
+        finally:
+            page.close()
 
 
-def test_python():
-    """The recipe for Python needs requests and numpy alone and brings series, spectra and five clearances."""
-    out, _, whole, psd = cook("python", "/usr/bin/python3", ending=".py")
-    lines = out.splitlines()
-    assert lines[0] == f"{len(whole)} samples, peak {abs(whole[:, 1]).max()} m", out
-    assert lines[1] == f"most power at {psd[numpy.argmax(psd[:, 1]), 0]} Hz", out
-    assert len(lines) == 7 and len({line.split()[1] for line in lines[2:]}) == 5, out
-    used = set(re.findall(r"^(?:import|from) (\w+)", recipe("python"), re.M))
-    assert used == {"io", "numpy", "requests"}, used
+def page_test(path):
+    def test():
+        check(path)
+    test.__doc__ = f"{path} runs as printed"
+    return test
 
 
-def test_octave():
-    """The recipe for Octave and MATLAB brings the same series and spectra as arrays."""
-    out, tables, whole, psd = cook("octave", "octave-cli", "--no-init-file", "--quiet", ending=".m")
-    assert numpy.array_equal(tables["motion.csv"][:, 1], whole[:, 1]) and numpy.array_equal(tables["psd.csv"], psd)
-    assert out.splitlines() == [f"{len(whole)} samples, peak {abs(whole[:, 1]).max():g} m, 22 impacts",
-                                f"most power at {psd[numpy.argmax(psd[:, 1]), 0]:g} Hz"], out
+for one in PAGES:
+    globals()["test_" + os.path.basename(one)] = page_test(one)
 
 
-# Lines that are not for a test: they install, need a certificate or a machine of that name, or go on for minutes.
-LEFT_OUT = re.compile(r"demo\.sh|run\.sh|^cmake|^ctest|^systemctl|^man |serve|example\.org|retell\.py|bench/|tests/|"
-                      r"^curl --json '\{$")
-# Which scene a line is about, where it is not the first one.
-SCENES = {"impactd ensemble": "paper_random_sponge", "impactd study": "compare_sponge", "impactd sweep": "sweep_clearance_buffer",
-          "impactd optimize": "optimize_clearance", "impactd calibrate": "calibrate_free_sponge", "impactd response": "response_sponge",
-          "impactd fragility": "with_records/fragility"}
-
-
-def lines():
-    """The README's lines for a shell, without what is said of them."""
-    with open(os.path.join(program.SOURCE, "README.md"), encoding="utf-8") as file:
-        text = re.sub(r"^```.*?^```$", "", file.read(), flags=re.M | re.S)
-    found = re.findall(r"^    ((?:curl|impactd|\w+=\$\(impactd|[\w./]+\.(?:sh|py)) ?.*?)(?:  +# .*|  +[a-z].*)?$", text, re.M)
-    return list(dict.fromkeys(line for line in found if not LEFT_OUT.search(line)))
-
-
-def test_lines():
-    """Every other line of the README for a shell runs, one after the other, each with a scene that fits it."""
-    kept = lines()
-    motion = "A title\nof two lines\nin g\nNPTS= 4, DT= .01 SEC\n 0.1 0.2 -0.1 0.05\n"
-    assert len(kept) > 25, kept
-    with program.daemon("--max-cpu-seconds", "1000") as daemon, tempfile.TemporaryDirectory() as folder:
-        with open(os.path.join(folder, "motion.AT2"), "w", encoding="utf-8") as file:
-            file.write(motion)
-        with open(os.path.join(folder, "measured.csv"), "w", encoding="utf-8") as file:
-            file.write("time [s],acceleration [m/s^2]\n" + "".join(f"{0.001 * i:.3f},{0.1 * (i % 7)}\n" for i in range(40)))
-        cork = {"slug": "cork", "name": "Cork", "restitution": 0.4, "contact_time": 0.01, "source": "a guess"}
-        drops = {"gravity": 0, "drops": [{"drop_height": 0.1, "rebound_height": 0.0001 * height} for height in (158, 161, 164)]}
-        revision = {"name": "Sponge", "restitution": 0.6, "contact_time": 0.025, "source": "six drops", "comment": "measured anew"}
-        for name, document in (("cork", cork), ("test", drops), ("drops", drops), ("revision", revision)):
-            with open(os.path.join(folder, name + ".json"), "w", encoding="utf-8") as file:
-                json.dump(document, file)
-        with open(os.path.join(folder, "force.csv"), "w", encoding="utf-8") as file:
-            file.write("time [s],force [N]\n" + "".join(f"{0.001 * i:.3f},{max(0, numpy.sin(0.3 * i - 3)) if i < 20 else 0:.4f}\n" for i in range(60)))
-        one, two = (program.finished(daemon, program.scene(name)) for name in ("paper_free_sponge", "paper_free_aluminium"))
-        swept = program.finished(daemon, program.scene("sweep_clearance_buffer"))
-        for line in kept:
-            name = next((scene for begin, scene in SCENES.items() if line.startswith(begin)), "paper_free_sponge")
-            scene = program.scene(name)
-            records = re.findall(r"--record (\w+)\.AT2", line)
-            if records:
-                scene["study"]["records"] = records
-            for record in records:
-                with open(os.path.join(folder, record + ".AT2"), "w", encoding="utf-8") as file:
-                    file.write(motion)
-            with open(os.path.join(folder, "scene.json"), "w", encoding="utf-8") as file:
-                json.dump({**scene, "duration": min(3, scene["duration"])}, file)
-            is_end = re.search(r"cancel|jobs/\$JOB$", line)
-            job = daemon.submit(endless(), headers={"Prefer": "respond-async"}).json()["id"] if is_end else one["id"]
-            said = re.sub(r"\[\.\.\.\]", str([0.1 * i for i in range(40)]), line).replace("r-…", one["result"])
-            said = said.replace(USUAL, daemon.url).replace("localhost:8080", f"localhost:{daemon.port}")
-            said = re.sub(r"\bcurl ", "curl -fsS ", said)
-            done = subprocess.run(["bash", "-euc", said], cwd=folder, capture_output=True, text=True, timeout=200, check=False,
-                                  env={**os.environ, "IMPACTD_SERVER": daemon.url, "HOME": folder, "URL": daemon.url,
-                                       "XDG_STATE_HOME": folder, "R": (swept if "points/" in line else one)["result"], "RESULT": two["result"],
-                                       "JOB": job, "job": job, "other": two["id"], "PATH": program.build + os.pathsep + os.environ["PATH"]})
-            assert done.returncode == 0, (line, said, done)
+def test_a_fault_is_found_at_its_line():
+    """A block that fails, hangs, prints something else or is no scene is reported with its line."""
+    global MAX_SECONDS
+    pages = {"```sh\ntrue\nfalse | cat\n```\n": ":2: ```sh exit code 1:\nline 3: cat: exit code 1",
+             "```sh\nsleep 9\n```\n": ":2: ```sh takes more than 0.5 s",
+             "```python\nx = 1\n```\n\n```python\nassert x == 2\n```\n": ', line 6, in <module>',
+             "```octave\nx = 1;\n```\n```octave\nassert(x == 2)\n```\n": ":5: ```octave exit code 1",
+             "```console\n$ echo one\nthree\n```\n```text output\n...two\n```\n": "the output is not the printed one but:\none",
+             '```json\n{"structure": {"mass": -1}}\n```\n': "must be above 0 kg",
+             '```json\n{"slug": "a", "colour": 1}\n```\n': "neither a scene nor another body",
+             '```json fragment\n"a": 1, b\n```\n': "not JSON",
+             "A line\n\n    impactd run scene.json\n": "commands belong in"}
+    with tempfile.TemporaryDirectory() as folder:
+        for text, fault in pages.items():
+            path = os.path.join(folder, "page.md")
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(text)
+            usual, MAX_SECONDS = MAX_SECONDS, 0.5 if "sleep" in text else MAX_SECONDS
+            try:
+                check(path)
+            except AssertionError as error:
+                assert fault in str(error), (text, str(error))
+            else:
+                raise AssertionError(("no fault", text))
+            finally:
+                MAX_SECONDS = usual
 
 
 if __name__ == "__main__":
