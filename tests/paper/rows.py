@@ -1,10 +1,10 @@
-"""What a row of the retelling is, and how two models are judged to agree or to differ.
+"""What a row of the table is, and how two models are judged to agree or to differ.
 
 A row's "holds" is computed from the criterion that it states. Rows that are "firm" are of motions that rounding cannot
 change; of the others another machine may find slightly different numbers. The experiments are not in the paper's text:
 where it says that a simulation matches one, what can be told is whether its two models agree. How closely they have to,
 a repeated test says: the same model with the ball or the release a little elsewhere. Used by free.py, forced.py,
-contact.py and retell.py."""
+contact.py and reproduce.py."""
 
 import numpy
 

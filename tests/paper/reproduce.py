@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The paper, retold: Figures 4 to 13 of Li and Darby as scenes, run by `impactd run`.
+"""The paper reproduced: Figures 4 to 13 of Li and Darby as scenes, run by `impactd run`.
 
-Prints a table: what the paper says, what its scenes give, whether that holds. Writes it as retold.txt and retold.json,
+Prints a table: what the paper says, what its scenes give, whether that holds. Writes it as figures.txt and figures.json,
 with one chart, chart.svg, into --out; these three are committed, and README.md shows the rows marked as brief. A test,
 truth/test_paper.py, keeps the firm ones true."""
 
@@ -38,7 +38,7 @@ def all_rows(seeds):
 
 def table(rows, choices):
     """All of it as text."""
-    lines = ["The paper, retold (tests/paper/retell.py). Its experiments are not in its text: what can be told is",
+    lines = ["The paper, reproduced (tests/paper/reproduce.py). Its experiments are not in its text: what can be told is",
              "whether its two models agree where it says that both match one. A repeated test is one model twice, the",
              "second time started slightly otherwise. Rows marked * hold motions that amplify rounding.", ""]
     for row in rows:
@@ -68,15 +68,15 @@ def markdown(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", default=program.build, help="folder of the build to ask")
-    parser.add_argument("--out", default=HERE, help="folder for retold.txt, retold.json and chart.svg")
+    parser.add_argument("--out", default=HERE, help="folder for figures.txt, figures.json and chart.svg")
     arguments = parser.parse_args()
     program.build = os.path.abspath(arguments.build)
     rows = all_rows(SEEDS)
     choices = all_open(SEEDS)
     points = next(row for row in rows if "points" in row["values"])["values"]["points"]
     text = table(rows, choices)
-    for name, content in (("retold.txt", text), ("chart.svg", draw(points)),
-                          ("retold.json", json.dumps(rounded({"rows": rows, "open": choices}), indent=1) + "\n")):
+    for name, content in (("figures.txt", text), ("chart.svg", draw(points)),
+                          ("figures.json", json.dumps(rounded({"rows": rows, "open": choices}), indent=1) + "\n")):
         with open(os.path.join(arguments.out, name), "w", encoding="utf-8") as file:
             file.write(content)
     print(text + "\n" + markdown(rows), end="")
