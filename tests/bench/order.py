@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The order of each solver with a step, as observed: error of the displacement against the step, as an envelope.
 
-    /usr/bin/python3 tests/bench/order.py --build build        # prints the README's table
+    /usr/bin/python3 tests/bench/order.py --build build        # prints the table of README.md
     /usr/bin/python3 tests/bench/order.py --all                # and every envelope that it comes from
 
 How deep a step happens to end in a stop is chance, so each point is the largest error of neighbouring steps, from H/n to 2/3 of

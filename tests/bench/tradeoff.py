@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Error against CPU time of the paper's four scenes: the README's table, and its charts into a folder.
+"""Error against CPU time of the paper's four scenes: the table of README.md, and charts into a folder.
 
     /usr/bin/python3 tests/bench/tradeoff.py --build build              # prints the table
     /usr/bin/python3 tests/bench/tradeoff.py --charts tests/bench/epyc_9005

@@ -2,7 +2,7 @@
 """The paper reproduced: Figures 4 to 13 of Li and Darby as scenes, run by `impactd run`.
 
 Prints a table: what the paper says, what its scenes give, whether that holds. Writes it as figures.txt and figures.json,
-with one chart, chart.svg, into --out; these three are committed, and README.md shows the rows marked as brief. A test,
+with one chart, chart.svg, into --out; these three are committed, and README.md beside it shows the rows marked as brief. A test,
 truth/test_paper.py, keeps the firm ones true."""
 
 import argparse

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The paper's figures, as tests/paper/ reproduces them: what is firm in them stays true, and the README shows it.
+"""The paper's figures, as tests/paper/ reproduces them: what is firm in them stays true, and its README shows it.
 
 The light version: fewer random bases, nothing varied. tests/paper/reproduce.py is the whole."""
 
@@ -148,11 +148,11 @@ def test_criteria_can_fail():
 
 
 def test_readme_shows_the_table():
-    """README.md has the committed rows, what other choices change, and the command that remakes all of it."""
-    with open(os.path.join(program.SOURCE, "README.md"), encoding="utf-8") as file:
+    """tests/paper/README.md has the committed rows and the chart; other choices change what it says they do."""
+    with open(os.path.join(PAPER, "README.md"), encoding="utf-8") as file:
         readme = file.read()
     assert reproduce.markdown(committed()["rows"]) in readme, "the table is not that of tests/paper/figures.json"
-    assert "(tests/paper/chart.svg)" in readme
+    assert "(chart.svg)" in readme
     varied = [one for entry in committed()["open"] for one in entry["others"] if "aluminium" in one]
     kept = [one for one in varied if not one["choice"].startswith("the instant")]
     assert len(kept) == len(varied) - 1 > 10
