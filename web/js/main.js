@@ -2,14 +2,14 @@
 import { read } from "./address.js";
 import { get, onUnauthorised, readUntil, setToken, token } from "./api.js";
 import { failure, fill, h, once, tell } from "./dom.js";
+import { themed } from "./theme.js";
 
 // A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, leave()?}:
 // for a new query on the same path (false: show it anew), and for the end, when `signal` is aborted.
 // "materials" is in materials_page.js, "materials/felt" in material_page.js, "materials/felt/measure" in measure_page.js.
 const pages = ["scene", "jobs", "job", "result", "compare", "materials", "material", "measure", "records", "record", "shell"];
 
-const [main, themeButton, tokenButton, skip, version] = ["main", "theme", "token", "skip", "version"]
-  .map((id) => document.getElementById(id));
+const [main, tokenButton, skip, version] = ["main", "token", "skip", "version"].map((id) => document.getElementById(id));
 let shown = null; // {path, stop, controller: promise}
 
 async function show() {
@@ -51,22 +51,7 @@ async function open(address, path, signal, last) {
   }
 }
 
-// The theme: the system's until the reader chooses.
-const root = document.documentElement, system = matchMedia("(prefers-color-scheme: dark)");
-const isDark = () => (root.dataset.theme ? root.dataset.theme === "dark" : system.matches);
-function setTheme(theme) {
-  if (theme) root.dataset.theme = theme;
-  themeButton.hidden = false;
-  themeButton.textContent = isDark() ? "Light" : "Dark";
-  themeButton.ariaLabel = `Use ${isDark() ? "light" : "dark"} colours`;
-  dispatchEvent(new Event("themechange")); // plots draw themselves anew
-}
-themeButton.onclick = () => {
-  setTheme(isDark() ? "light" : "dark");
-  localStorage.setItem("impactd.theme", root.dataset.theme);
-};
-system.onchange = () => setTheme();
-setTheme(localStorage.getItem("impactd.theme"));
+themed(document.getElementById("theme"));
 
 // The token, asked for where the service wants one, kept until the tab is closed.
 const askToken = once(() => new Promise((resolve) => {
