@@ -1,21 +1,21 @@
 # Files as C arrays inside the binary, so that it runs from anywhere.
 #
-#   impactd_embed(TARGET NAME FILE...)   adds to TARGET the table `embedded_NAME` of server/util/embedded.h: one row
-#                                        per file, by its path from the project's folder, in the order given.
+#   impactd_embed(TARGET NAME ROOT FILE...)   adds to TARGET the table `embedded_NAME` of server/util/embedded.h: one
+#                                             row per file, by its path from the folder ROOT, in the order given.
 #
 # The same file is the script that writes one such table while building (cmake -P).
 
 if(NOT CMAKE_SCRIPT_MODE_FILE)
     set(IMPACTD_EMBED_SCRIPT ${CMAKE_CURRENT_LIST_FILE})
 
-    function(impactd_embed target name)
+    function(impactd_embed target name root)
         set(source ${PROJECT_BINARY_DIR}/embedded/${name}.c)
         set(list ${PROJECT_BINARY_DIR}/embedded/${name}.txt)
         # The list is a file: a rule's command line has a limit, and a file taken away must rewrite the table.
         list(JOIN ARGN "\n" lines)
         file(CONFIGURE OUTPUT ${list} CONTENT "${lines}\n" @ONLY)
         add_custom_command(OUTPUT ${source}
-            COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DLIST=${list} -DROOT=${PROJECT_SOURCE_DIR} -DSOURCE=${source}
+            COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DLIST=${list} -DROOT=${root} -DSOURCE=${source}
                 -P ${IMPACTD_EMBED_SCRIPT}
             DEPENDS ${ARGN} ${list} ${IMPACTD_EMBED_SCRIPT}
             COMMENT "Embedding ${name}"

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "core/math/fft.h"
+#include "server/api/app.h"
 #include "server/cli/command.h"
 
 // The first file opened takes the number of a closed standard stream, and would be given what is
@@ -16,5 +17,6 @@ static void keep_standard_streams(void) {
 int main(int argc, char **argv) {
     keep_standard_streams();
     fft_start();
+    guide_files = embedded_guide;
     return command_main(argc, argv);
 }

@@ -49,7 +49,11 @@ Handler records_create, records_list, records_show, records_samples, records_spe
 Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
 Handler short_ids_redirect; // of no route: Router.not_found
-Handler assets_show, assets_show_icon;
+Handler assets_show, assets_show_icon, guide_show, problems_show;
+
+// The pages of the guide, "guide/index.html" ...; set by main.c, since they are printed by programs
+// that use these tables. NULL: none.
+extern const EmbeddedFile *guide_files;
 
 // The table of a ground motion in the body, records.c. Cleared by ground_motion_text_clear.
 Status records_read_motion(const Request *request, const GroundMotionOptions *options,

@@ -1,6 +1,6 @@
-// GET /: how to begin. Browsers get the dashboard, made of the files under web/; everyone else
-// lines that can be pasted into a shell. The browser checks each time that its copy of a file is
-// current.
+// GET /: browsers get the dashboard, made of the files under web/; all other clients get lines that
+// can be pasted into a shell. GET /guide/: the guide. The browser checks each time that its copy of
+// a file is current.
 #include <stdio.h>
 #include <string.h>
 
@@ -47,12 +47,14 @@ Status landing_show(App *app, const Request *request, Reply *reply, Problem *pro
 static const struct {
     const char *extension, *content_type;
 } types[] = {
+    {".html", "text/html; charset=utf-8"},
     {".js", "text/javascript; charset=utf-8"},
     {".css", "text/css; charset=utf-8"},
+    {".json", type_json},
     {".svg", "image/svg+xml"},
+    {".png", "image/png"},
 };
 
-// NULL: it has no path of its own, where the page's relative links would be wrong.
 static const char *asset_type(const char *path) {
     const char *extension = strrchr(path, '.');
     for (size_t i = 0; extension != NULL && i < COUNT(types); i++)
@@ -61,21 +63,52 @@ static const char *asset_type(const char *path) {
     return NULL;
 }
 
-Status assets_show(App *app, const Request *request, Reply *reply, Problem *problem) {
-    (void)app;
-    const char *path = request->path + 1,
-               *type = asset_type(path); // a file's path has no first slash
-    const EmbeddedFile *file = embedded_find(embedded_web, path);
+static Status asset_reply(const EmbeddedFile *table, const char *path, const Request *request,
+                          Reply *reply, Problem *problem) {
+    const EmbeddedFile *file = table != NULL ? embedded_find(table, path) : NULL;
+    const char *type = asset_type(path);
     if (file == NULL || type == NULL)
-        return problem_set(problem, STATUS_NOT_FOUND, "the dashboard has no file \"%.120s\"", path);
+        return problem_set(problem, STATUS_NOT_FOUND, "there is no file \"%.120s\"", path);
     reply->policy = reply_page_policy;
     return reply_embedded(reply, request, file, type);
 }
 
+Status assets_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)app;
+    const char *path = request->path + 1; // a file's path has no first slash
+    // The links of the page are relative to "/".
+    const bool is_page = strcmp(path, "web/index.html") == 0;
+    return asset_reply(is_page ? NULL : embedded_web, path, request, reply, problem);
+}
+
 Status assets_show_icon(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)app;
-    const EmbeddedFile *file = embedded_find(embedded_web, "web/icon.svg");
-    if (file == NULL)
-        return problem_set(problem, STATUS_INTERNAL, "this program was built without its icon");
-    return reply_embedded(reply, request, file, asset_type(file->path));
+    return asset_reply(embedded_web, "web/icon.svg", request, reply, problem);
+}
+
+const EmbeddedFile *guide_files;
+
+Status guide_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)app;
+    if (strcmp(request->path, "/guide") == 0) {
+        text_fit(reply->location, sizeof reply->location, "/guide/");
+        reply_borrow(reply, 308, NULL, NULL, 0);
+        return STATUS_OK;
+    }
+    const bool is_index = strcmp(request->path, "/guide/") == 0;
+    return asset_reply(guide_files, is_index ? "guide/index.html" : request->path + 1, request,
+                       reply, problem);
+}
+
+// The type of a problem document is an address: the section of the guide on that problem.
+Status problems_show(App *app, const Request *request, Reply *reply, Problem *problem) {
+    (void)app;
+    const char *name = request->parameters[0];
+    for (int i = STATUS_OK + 1; i < STATUS_COUNT; i++)
+        if (strcmp(status_slug((Status)i), name) == 0) {
+            snprintf(reply->location, sizeof reply->location, "/guide/problems.html#%s", name);
+            reply_borrow(reply, 303, NULL, NULL, 0);
+            return STATUS_OK;
+        }
+    return problem_set(problem, STATUS_NOT_FOUND, "there is no type of problem \"%.60s\"", name);
 }

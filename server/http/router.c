@@ -95,14 +95,19 @@ static void route_fill(const char *pattern, const char *path, char *target, size
 
 // The nearest path to one that no route fits; false if none is similar.
 static bool route_nearest(const Route *table, const char *path, char target[PATH_MAX_SHOWN]) {
+    // Files of pages, whose names may be anything.
+    static const char *const files[] = {"/web/{", "/guide/{", "/problems/{"};
     char filled[PATH_MAX_SHOWN];
     const char *const candidates[] = {target, filled, NULL}; // the nearest so far, and one more
     target[0] = '\0';
     if (strlen(path) >= sizeof filled)
         return false;
     for (const Route *route = table; route->method != NULL; route++) {
-        if (strncmp(route->pattern, "/web/", 5) == 0)
-            continue; // a page asks for its own files, and their names may be anything
+        size_t i = 0;
+        while (i < COUNT(files) && strncmp(route->pattern, files[i], strlen(files[i])) != 0)
+            i++;
+        if (i < COUNT(files))
+            continue;
         route_fill(route->pattern, path, filled, sizeof filled);
         if (spelling_nearest(candidates, path) == filled)
             memcpy(target, filled, sizeof filled);

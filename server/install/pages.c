@@ -311,6 +311,81 @@ static void completion_bash(FILE *file) {
           file);
 }
 
+// --- parts of the guide, in Markdown ---
+
+// Text in which no character is markup.
+static void markdown_text(FILE *file, const char *text) {
+    for (const char *c = text; *c != '\0'; c++) {
+        if (strchr("\\`*_{}[]<>#|~&!", *c) != NULL)
+            fputc('\\', file);
+        fputc(*c, file);
+    }
+}
+
+// The lines before the first empty one are examples, the others are text.
+static void markdown_help(FILE *file, const char *help) {
+    bool is_example = true;
+    fputs("```sh not-run\n", file);
+    for (; *help != '\0'; help += strcspn(help, "\n") + 1) {
+        char line[512];
+        snprintf(line, sizeof line, "%.*s", (int)strcspn(help, "\n"), help);
+        if (line[0] == '\0') {
+            fputs(is_example ? "```\n\n" : "\n", file);
+            is_example = false;
+        } else if (is_example) {
+            fprintf(file, "%s\n", line + strspn(line, " "));
+        } else {
+            markdown_text(file, line);
+            fputc('\n', file);
+        }
+    }
+    fputs(is_example ? "```\n\n" : "\n", file);
+}
+
+static void markdown_option(FILE *file, const Field *fields, const Field *row) {
+    char name[OPTION_NAME];
+    const char letter = option_spell(fields, row, name);
+    fputs("| ", file);
+    if (letter != '\0')
+        fprintf(file, "`-%c`, ", letter);
+    fprintf(file, "`%s", name);
+    if (row->kind == FIELD_KIND_CHOICE)
+        for (size_t i = 0; row->choices[i] != NULL; i++)
+            fprintf(file, "%s%s", i > 0 ? "\\|" : " ", row->choices[i]);
+    else if (row->kind != FIELD_KIND_FLAG)
+        fputs(row->kind == FIELD_KIND_COUNT  ? " N"
+              : row->kind == FIELD_KIND_REAL ? " X"
+                                             : " TEXT",
+              file);
+    fputs("` | ", file);
+    markdown_text(file, row->doc);
+    if (row->unit != NULL) {
+        fputs(" [", file);
+        markdown_text(file, row->unit);
+        fputs("]", file);
+    }
+    fputs(" |\n", file);
+}
+
+static void part_commands(FILE *file) {
+    for (size_t i = 0; commands[i] != NULL; i++) {
+        const Command *command = commands[i];
+        fprintf(file, "## impactd %s\n\n", command->name);
+        markdown_text(file, command->summary);
+        fprintf(file, ".\n\n```text\nimpactd %s%s%s%s\n```\n\n", command->name,
+                command->options != NULL ? " [OPTION]..." : "",
+                command->operands != NULL ? " " : "",
+                command->operands != NULL ? command->operands : "");
+        markdown_help(file, command->help);
+        if (command->options == NULL || command->options->kind == FIELD_KIND_END)
+            continue;
+        fputs("| option | meaning |\n|---|---|\n", file);
+        for (const Field *row = command->options; row->kind != FIELD_KIND_END; row++)
+            markdown_option(file, command->options, row);
+        fputc('\n', file);
+    }
+}
+
 static const struct {
     const char *name;
     void (*print)(FILE *file);
@@ -318,6 +393,7 @@ static const struct {
     {"impactd.1", manual_program},
     {"impactd-scene.5", manual_scene},
     {"impactd.bash", completion_bash},
+    {"commands.md", part_commands},
 };
 
 int main(int argc, char **argv) {

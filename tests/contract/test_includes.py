@@ -45,6 +45,8 @@ FOREIGN = {
     "libdeflate.h": ["server/util/gzip.c"],
     "curl/": ["server/cli/client.c"],
     "dragonbox/": ["server/util/dtoa.cpp"],
+    "cmark-gfm.h": ["server/install/guide.c"],
+    "cmark-gfm-core-extensions.h": ["server/install/guide.c"],
 }
 
 # Calls -> (why, where they are allowed all the same).

@@ -154,6 +154,7 @@ def test_real_answers_have_the_promised_shapes():
                   **{f"/v1/materials/{{slug}}@{{revision}}{rest}": {"slug": "sponge", "revision": "1"} for rest in ("", "/used-by")},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"},
                   "/web/{file}": {"file": "style.css"}, "/web/{folder}/{file}": {"folder": "js", "file": "main.js"},
+                  "/guide/{file}": {"file": "problems.html"}, "/problems/{name}": {"name": "not-found"},
                   "/web/vendor/{library}/{file}": {"library": "uplot", "file": "uPlot.esm.js"}}
 
         def call(method, path, target, **options):

@@ -1,0 +1,116 @@
+// What the guide's pages do beyond HTML: the theme, copying code, the heading in sight, and the search.
+import { get } from "../web/js/api.js";
+import { fill, h } from "../web/js/dom.js";
+import { themed } from "../web/js/theme.js";
+
+const MOST = 12, EXCERPT = 130; // results; characters before and after a word
+const at = (id) => document.getElementById(id);
+themed(at("theme"));
+
+// Code: of a console only what is typed, without its prompts.
+for (const block of document.querySelectorAll("main pre")) {
+  const code = block.querySelector("code"), box = h("div.code-box");
+  const typed = () => (code.classList.contains("language-console")
+    ? code.textContent.split("\n").filter((line) => line.startsWith("$ ")).map((line) => line.slice(2)).join("\n") : code.textContent);
+  const button = h("button", { type: "button", onclick: copy }, "Copy");
+  async function copy() {
+    button.textContent = await navigator.clipboard.writeText(typed()).then(() => "Copied", () => "Not allowed");
+    setTimeout(() => (button.textContent = "Copy"), 2000);
+  }
+  block.replaceWith(box);
+  box.append(block, button);
+}
+
+// The heading that is read is marked in the list of headings.
+const entries = new Map([...document.querySelectorAll("#contents a")].map((link) => [decodeURIComponent(link.hash.slice(1)), link]));
+const headings = [...entries.keys()].map(at).filter(Boolean);
+function mark() {
+  const read = headings.findLast((heading) => heading.getBoundingClientRect().top < 120);
+  for (const [id, link] of entries) link.ariaCurrent = id === read?.id ? "true" : null;
+}
+addEventListener("scroll", () => requestAnimationFrame(mark), { passive: true });
+mark();
+for (const list of [at("pages"), at("contents")])
+  list.addEventListener("click", (event) => event.target.closest("a") && list.matches(":popover-open") && list.hidePopover());
+
+// The search. The index is read when the field gets the focus: [[page, title, [[anchor, heading, text] ...]] ...].
+const words = at("words"), found = at("found");
+let index = null, chosen = -1;
+at("search").hidden = false;
+
+const plain = (text) => text.toLowerCase();
+async function read() {
+  index ??= get("search.json").then((pages) => pages.flatMap(([page, title, sections]) => sections.map(([anchor, heading, text]) =>
+    ({ href: `${page === "index" ? "./" : `${page}.html`}${anchor && `#${anchor}`}`, title, heading, text, anchor,
+      low: { title: plain(title), heading: plain(heading), text: plain(text) } }))));
+  index.catch(() => (index = null));
+  return index;
+}
+
+// How well a section fits all words, 0 where one is missing: a heading counts more than a title, and that more than the text.
+function score({ low, anchor }, wanted) {
+  let sum = 0;
+  for (const word of wanted) {
+    const starts = (text) => text.startsWith(word) || text.includes(` ${word}`);
+    const one = (low.heading === word ? 60 : starts(low.heading) ? 40 : low.heading.includes(word) ? 25 : 0)
+      + (anchor && low.title.includes(word) ? 8 : 0) + (starts(low.text) ? 4 : low.text.includes(word) ? 2 : 0);
+    if (one === 0) return 0;
+    sum += one;
+  }
+  return sum + (low.heading.includes(wanted.join(" ")) ? 30 : low.text.includes(wanted.join(" ")) ? 6 : 0) + (anchor ? 0 : 5);
+}
+
+const escape = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
+const marked = (text, wanted) => text.split(new RegExp(`(${wanted.map(escape).join("|")})`, "i")).map((part, i) => (i % 2 ? h("mark", null, part) : part));
+function excerpt({ text, low }, wanted) {
+  const place = Math.min(...wanted.map((word) => low.text.indexOf(word)).filter((one) => one >= 0), text.length);
+  const from = Math.max(0, place === text.length ? 0 : place - EXCERPT / 2), part = text.slice(from, from + EXCERPT);
+  return `${from > 0 ? "…" : ""}${part.trim()}${from + EXCERPT < text.length ? "…" : ""}`;
+}
+
+function choose(next) {
+  const options = found.querySelectorAll("[role=option]");
+  chosen = options.length ? (next + options.length) % options.length : -1;
+  options.forEach((option, i) => (option.ariaSelected = String(i === chosen)));
+  if (chosen >= 0) options[chosen].scrollIntoView({ block: "nearest" });
+  words.setAttribute("aria-activedescendant", chosen >= 0 ? options[chosen].id : "");
+}
+
+function close() {
+  found.hidden = true;
+  words.ariaExpanded = "false";
+  words.removeAttribute("aria-activedescendant");
+}
+
+async function search() {
+  const wanted = plain(words.value).split(/\s+/).filter(Boolean);
+  if (wanted.length === 0) return close();
+  const sections = await read().catch(() => null);
+  if (plain(words.value).split(/\s+/).filter(Boolean).join(" ") !== wanted.join(" ")) return; // typed meanwhile
+  const best = (sections ?? []).map((section) => ({ section, points: score(section, wanted) })).filter(({ points }) => points > 0)
+    .sort((a, b) => b.points - a.points).slice(0, MOST);
+  fill(found, best.map(({ section }, i) => h("a", { role: "option", id: `found-${i}`, href: section.href, tabindex: "-1", onclick: close },
+    h("b", null, section.anchor ? [h("span.quiet", null, `${section.title} › `)] : [], marked(section.heading, wanted)),
+    marked(excerpt(section, wanted), wanted))),
+    best.length === 0 && h("p", null, sections ? `Nothing has ${words.value.trim()}.` : "The index cannot be read; is the daemon running?"));
+  found.hidden = false;
+  words.ariaExpanded = "true";
+  choose(0);
+}
+
+words.addEventListener("input", search);
+words.addEventListener("focus", () => read().then(search, () => {}));
+words.addEventListener("keydown", (event) => {
+  if (event.key === "ArrowDown" || event.key === "ArrowUp") choose(chosen + (event.key === "ArrowDown" ? 1 : -1));
+  else if (event.key === "Enter") found.querySelector("[aria-selected=true]")?.click();
+  else if (event.key === "Escape") close();
+  else return;
+  event.preventDefault();
+});
+addEventListener("keydown", (event) => {
+  if (event.key !== "/" || event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input, textarea, select")) return;
+  event.preventDefault();
+  words.focus();
+  words.select();
+});
+addEventListener("click", (event) => !at("search").contains(event.target) && close());
