@@ -96,7 +96,7 @@ static void route_fill(const char *pattern, const char *path, char *target, size
 // The nearest path to one that no route fits; false if none is similar.
 static bool route_nearest(const Route *table, const char *path, char target[PATH_MAX_SHOWN]) {
     // Files of pages, whose names may be anything.
-    static const char *const files[] = {"/web/{", "/guide/{", "/problems/{"};
+    static const char *const files[] = {"/web/", "/guide/", "/problems/"};
     char filled[PATH_MAX_SHOWN];
     const char *const candidates[] = {target, filled, NULL}; // the nearest so far, and one more
     target[0] = '\0';
