@@ -281,8 +281,10 @@ static void page_check_picture(const GuidePage *page, cmark_node *node) {
     node_text(node, &description);
     const char *url = cmark_node_get_url(node);
     snprintf(path, sizeof path, "%s/%s", guide.folder, url);
-    if (strchr(url, '/') != NULL || access(path, R_OK) != 0)
+    if (strchr(url, '/') != NULL)
         guide_fault(page, "the picture %s is not in this folder", url);
+    else
+        guide.missing += access(path, R_OK) != 0;
     if (description.count == 0)
         guide_fault(page, "the picture %s has no description", url);
     bytes_clear(&description);
@@ -519,6 +521,7 @@ int main(int argc, char **argv) {
     if (guide.faults == 0)
         search_write();
     if (guide.missing > 0)
-        fprintf(stderr, "%s: %zu pages and links to them are missing\n", argv[1], guide.missing);
+        fprintf(stderr, "%s: %zu pages, links to them and pictures are missing\n", argv[1],
+                guide.missing);
     return guide.faults > 0 ? 1 : 0;
 }
