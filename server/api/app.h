@@ -50,6 +50,7 @@ Handler examples_list, examples_show, schemas_list, schemas_show, openapi_show;
 Handler health_live, health_ready, metrics_show, version_show, landing_show;
 Handler short_ids_redirect; // of no route: Router.not_found
 Handler assets_show, assets_show_icon, guide_show, problems_show;
+Handler client_files_list, client_files_show;
 
 // The pages of the guide, "guide/index.html" ...; set by main.c, since they are printed by programs
 // that use these tables. NULL: none.

@@ -17,6 +17,7 @@ extern const EmbeddedFile embedded_sql[];      // schema/sql/*.sql, the schema f
 extern const EmbeddedFile embedded_schemas[];  // schema/*.json
 extern const EmbeddedFile embedded_examples[]; // schema/examples/*.json
 extern const EmbeddedFile embedded_web[];      // web/, all that a browser loads
+extern const EmbeddedFile embedded_client[];   // web/client/, clients in other languages
 extern const EmbeddedFile embedded_guide[];    // guide/, of the program alone: guide_files
 
 // The row of that path, NULL if there is none. The tables are short.

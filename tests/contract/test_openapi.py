@@ -153,7 +153,7 @@ def test_real_answers_have_the_promised_shapes():
                   **{f"/v1/materials/{{slug}}{rest}": {"slug": "sponge"} for rest in ("", "/revisions", "/history", "/diff", "/used-by")},
                   **{f"/v1/materials/{{slug}}@{{revision}}{rest}": {"slug": "sponge", "revision": "1"} for rest in ("", "/used-by")},
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"},
-                  "/web/{file}": {"file": "style.css"}, "/web/{folder}/{file}": {"folder": "js", "file": "main.js"},
+                  "/client/{file}": {"file": "impactd.py"}, "/web/{file}": {"file": "style.css"}, "/web/{folder}/{file}": {"folder": "js", "file": "main.js"},
                   "/guide/{file}": {"file": "problems.html"}, "/problems/{name}": {"name": "not-found"},
                   "/web/vendor/{library}/{file}": {"library": "uplot", "file": "uPlot.esm.js"}}
 
