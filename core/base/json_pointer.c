@@ -68,8 +68,8 @@ static bool json_pointer_fail_name(const Field *fields, const char *token, const
                                    char message[JSON_POINTER_MESSAGE_MAX]) {
     const char *near = spelling_nearest_field(fields, token);
     return json_pointer_fail(message, "there is no \"%s\" in %s%s%s%s", token, of,
-                             near != NULL ? ": perhaps " : "", near != NULL ? near : "",
-                             near != NULL ? " is meant" : "");
+                             near != NULL ? " (did you mean " : "", near != NULL ? near : "",
+                             near != NULL ? "?)" : "");
 }
 
 static void json_pointer_note_shorthand(PointerTarget *target, const Field *field, void *member) {
@@ -98,7 +98,7 @@ static bool json_pointer_element(PointerTarget *target, const Field *field, void
     }
     const Reals *reals = member;
     if (!json_pointer_next_token(&pointer, token) || *pointer != '\0')
-        return json_pointer_fail(message, "nothing lies below an element of %s", field->name);
+        return json_pointer_fail(message, "there is nothing below an element of %s", field->name);
     if (!json_pointer_read_index(token, reals->count, &index))
         return json_pointer_fail(message, "%s has elements 0 to %zu, \"%s\" is none of them",
                                  field->name, reals->count > 0 ? reals->count - 1 : 0, token);
@@ -120,11 +120,11 @@ static bool json_pointer_walk(PointerTarget *target, const Field *fields, void *
             return json_pointer_fail(message,
                                      "must begin with a slash, as in /dampers/0/clearance");
         if (!json_pointer_next_token(&pointer, token))
-            return json_pointer_fail(
-                message, "a part of it is too long, or ~ stands without 0 or 1 behind it");
+            return json_pointer_fail(message,
+                                     "a part of it is too long, or ~ is not followed by 0 or 1");
         if (variant != NULL && strcmp(token, target->field->kinds->tag) == 0) {
             if (*pointer != '\0')
-                return json_pointer_fail(message, "%s is a name: nothing lies below it", token);
+                return json_pointer_fail(message, "%s is a name: there is nothing below it", token);
             target->is_tag = true;
             target->member = variant;
             return true;
@@ -170,7 +170,7 @@ static bool json_pointer_walk(PointerTarget *target, const Field *fields, void *
         case FIELD_KIND_ROWS:
             return json_pointer_element(target, field, member, pointer, message);
         default:
-            return json_pointer_fail(message, "nothing lies below %s", field->name);
+            return json_pointer_fail(message, "there is nothing below %s", field->name);
         }
     }
 }

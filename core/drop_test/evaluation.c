@@ -574,8 +574,8 @@ static Status evaluation_warn_of_outliers(Evaluation *evaluation) {
             continue;
         TRY(warnings_add(
             &evaluation->warnings, reading_pointer(row).at,
-            "%s %.4g of %s is %.1f robust deviations from the median; it counts: the mean is %.4g "
-            "with all readings and %.4g without outliers (%llu); a reading that is known to be "
+            "%s %.4g of %s is %.1f robust deviations from the median. It counts: the mean is %.4g "
+            "with all readings and %.4g without outliers (%llu). A reading that is known to be "
             "wrong needs \"excluded\" with the reason",
             is_time ? "contact time" : "restitution",
             is_time ? row->contact_time : row->restitution, row->from,

@@ -48,7 +48,7 @@ const Field reading_statistic_fields[] = {
     FIELD_REAL(Statistic, deviation, NULL, ANY, OPTIONAL, "standard deviation of the readings"),
     FIELD_REAL(Statistic, scatter, NULL, ANY, OPTIONAL, "standard deviation beyond the stated uncertainties; null: the mean is not weighted"),
     FIELD_REAL(Statistic, standard_error, NULL, ANY, OPTIONAL, "of the mean"),
-    FIELD_REAL(Statistic, spread, NULL, ANY, OPTIONAL, "standard deviation that a revision states beside the mean: scatter where the mean is weighted, else deviation, and standard_error at least"),
+    FIELD_REAL(Statistic, spread, NULL, ANY, OPTIONAL, "standard deviation that a revision states with the mean: scatter where the mean is weighted, else deviation, and standard_error at least"),
     FIELD_REAL(Statistic, low, NULL, ANY, OPTIONAL, "95 % interval of the mean"),
     FIELD_REAL(Statistic, high, NULL, ANY, OPTIONAL, "likewise"),
     FIELD_REAL(Statistic, minimum, NULL, ANY, OPTIONAL, "smallest reading"),

@@ -77,12 +77,12 @@ static Status record_check_named(const ExcitationRecord *record, const char *poi
     const NamedRecord *named = record_named(record);
     Status status = STATUS_OK;
     if (record->samples.count > 0)
-        status = record_refuse(pointer, "samples", "must not stand beside the name of a record",
+        status = record_refuse(pointer, "samples", "must not be given with the name of a record",
                                problem);
     if (!isnan(record->interval))
-        status =
-            record_refuse(pointer, "interval",
-                          "must not stand beside the name of a record, which has its own", problem);
+        status = record_refuse(pointer, "interval",
+                               "must not be given with the name of a record, which has its own",
+                               problem);
     if (named == NULL || strcmp(named->name, record->name) != 0) {
         return json_pointer_concerns(problem, pointer, "digest")
                    ? STATUS_INVALID
@@ -188,7 +188,7 @@ void record_look_doubt(const RecordLook *look, const char *before, const char *p
                           before, peak, look->peak_at);
     else if (peak < 1e-4)
         (void)problem_add(doubts, STATUS_INVALID, place,
-                          "%sreach only %.3g m/s^2: m/s^2 are meant; a scale of 9.80665 makes "
+                          "%sreach only %.3g m/s^2: the unit is m/s^2; a scale of 9.80665 makes "
                           "them of g",
                           before, peak);
     else if (record_drifts(look))
@@ -206,7 +206,7 @@ static void record_doubt(const Excitation *excitation, const Span *span, const c
     const RecordLook look =
         record_look(record_samples(record), record_interval(record), record->scale);
     const JsonPointer place = json_pointer_of(pointer, record->named != NULL ? "name" : "samples");
-    record_look_doubt(&look, record->named != NULL ? "stands for samples that " : "", place.at,
+    record_look_doubt(&look, record->named != NULL ? "represents samples that " : "", place.at,
                       doubts);
 }
 

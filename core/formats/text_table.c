@@ -153,7 +153,7 @@ static const char *text_refusal(const TextWord *word) {
     if (strncmp(letters, "NAN", 3) == 0 || strncmp(letters, "INF", 3) == 0)
         return "must be a finite number";
     if (memchr(word->at, '*', length) != NULL)
-        return "must be a number; stars stand for one that was too long for its field";
+        return "must be a number; stars replace one that was too long for its field";
     const char *end = text_number_end(word->at, word->end);
     if (end == word->end)
         return length > NUMBER_MAX ? "must be a number of at most 63 characters"

@@ -131,7 +131,7 @@ Status signal_comparison_align(const Signal *reference, const Signal *other, siz
     *rate = grid.coarse->rate;
     if (grid.count < least)
         return problem_set(problem, STATUS_LIMIT,
-                           "only %zu samples lie within both, at least %zu are needed", grid.count,
+                           "only %zu samples are within both, at least %zu are needed", grid.count,
                            least);
     TRY(columns_allocate(pair, 2, grid.count, 0, problem));
     for (size_t i = 0; i < grid.count; i++) {

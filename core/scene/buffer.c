@@ -28,11 +28,11 @@ static const Field test_fields[] = {
 };
 
 const Field buffer_fields[] = {
-    FIELD_TEXT(Buffer, material, 128, PRESENCE_OPTIONAL, 0, "a material, slug or slug@revision; beside numbers, where they come from"),
+    FIELD_TEXT(Buffer, material, 128, PRESENCE_OPTIONAL, 0, "a material, slug or slug@revision; with numbers, their source"),
     FIELD_REAL(Buffer, restitution, NULL, WITHIN(0, 1), OPTIONAL, "coefficient of restitution e"),
     FIELD_REAL(Buffer, contact_time, "s", ABOVE(0), OPTIONAL, "contact time T_c of an isolated impact"),
     FIELD_LIST(Buffer, table, row_fields, BUFFER_ROWS, PRESENCE_OPTIONAL, "restitution and contact time over approach speed, linear between the rows and constant beyond them"),
-    FIELD_REAL(Buffer, stiffness, "N/m", ABOVE(0), OPTIONAL, "contact stiffness k_b; k in N/m^n beside a restitution under a power law"),
+    FIELD_REAL(Buffer, stiffness, "N/m", ABOVE(0), OPTIONAL, "contact stiffness k_b; k in N/m^n with a restitution under a power law"),
     FIELD_REAL(Buffer, damping, "N s/m", AT_MIN(0), OPTIONAL, "contact damping c_b"),
     FIELD_REAL(Buffer, exponent, NULL, WITHIN(1, 10), OPTIONAL, "exponent n of a power law, 1.5 if not given"),
     FIELD_BASE(Buffer, test, test_fields),
@@ -129,7 +129,7 @@ static Status buffer_check_way(const Buffer *buffer, const ContactLaw *law, cons
     if (has_table &&
         (buffer_has(buffer->restitution) || buffer_has(buffer->contact_time) || is_known))
         return problem_add(problem, STATUS_INVALID, pointer,
-                           "must be given in one way: a table stands in place of restitution, "
+                           "must be given in one way: a table replaces restitution, "
                            "contact_time, stiffness and damping");
     if (law->form == CONTACT_POWER || has_table)
         return STATUS_OK;
@@ -146,15 +146,14 @@ static Status buffer_check_way(const Buffer *buffer, const ContactLaw *law, cons
                            "power laws such as hunt_crossley)");
     if (is_measured && !buffer_has(buffer->restitution))
         return json_pointer_fault(problem, pointer, "restitution",
-                                  "is required beside %s: coefficient of restitution e",
+                                  "is required with %s: coefficient of restitution e",
                                   "contact_time");
     if (is_known && !buffer_has(buffer->stiffness))
         return json_pointer_fault(problem, pointer, "stiffness",
-                                  "is required beside %s: contact stiffness k_b [N/m]", "damping");
+                                  "is required with %s: contact stiffness k_b [N/m]", "damping");
     if (is_known && !buffer_has(buffer->damping))
         return json_pointer_fault(problem, pointer, "damping",
-                                  "is required beside %s: contact damping c_b [N s/m]",
-                                  "stiffness");
+                                  "is required with %s: contact damping c_b [N s/m]", "stiffness");
     return STATUS_OK;
 }
 

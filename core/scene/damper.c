@@ -23,10 +23,10 @@ const Field damper_fields[] = {
     FIELD_REAL(Damper, offset, "m", ANY, 0, "of the stops' middle, relative to the structure"),
     FIELD_REAL(Damper, position, "m", ANY, 0, "initial, of the free mass relative to the stops' middle"),
     FIELD_REAL(Damper, velocity, "m/s", ANY, 0, "initial, of the free mass relative to the structure"),
-    FIELD_COUNT(Damper, storey, NULL, AT_MIN(1), OPTIONAL, "where it stands, from 1 at the ground; the top one if not given"),
-    FIELD_ITEM(Damper, buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at both stops"),
-    FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the left stop"),
-    FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "what stands at the right stop"),
+    FIELD_COUNT(Damper, storey, NULL, AT_MIN(1), OPTIONAL, "storey that carries it, from 1 at the ground; default: the top one"),
+    FIELD_ITEM(Damper, buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "the buffer at both stops"),
+    FIELD_ITEM(Damper, left_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "the buffer at the left stop"),
+    FIELD_ITEM(Damper, right_buffer, buffer_fields, "material", PRESENCE_OPTIONAL, "the buffer at the right stop"),
     FIELD_CHOICE(Damper, identified_for, identified_for_names, 0, "the pair of masses for which restitution and contact time hold"),
     FIELD_ITEM(Damper, rig, rig_fields, NULL, PRESENCE_OPTIONAL, "masses of the test that measured the buffers, for identified_for rig: the parameters identified there are carried over; if absent those of the material's revision"),
     FIELD_END
@@ -79,7 +79,7 @@ static Status damper_check_buffers(Damper *damper, const ContactLaw *law, const 
                            "is used by neither side: left_buffer and right_buffer are given too");
     if (!is_given[0] && !(is_given[1] && is_given[2]))
         return problem_add(problem, STATUS_INVALID, places[0],
-                           "is required: nothing stands at the %s (a material, restitution and "
+                           "is required: there is no buffer at the %s (a material, restitution and "
                            "contact_time, or stiffness and damping)",
                            is_given[1]   ? "right stop"
                            : is_given[2] ? "left stop"

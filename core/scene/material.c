@@ -34,7 +34,7 @@ const Field material_fields[] = {
     FIELD_REAL(Material, thickness, "m", ABOVE(0), OPTIONAL, "of the layer at the stop"),
     FIELD_TEXT(Material, hardness, 60, PRESENCE_OPTIONAL, 0, "with its scale, as \"Shore A 40\""),
     FIELD_TEXT(Material, supplier, 200, PRESENCE_OPTIONAL, 0, "who sells it, under what number"),
-    FIELD_TEXT(Material, notes, 4000, PRESENCE_OPTIONAL, 0, "whatever else one should know"),
+    FIELD_TEXT(Material, notes, 4000, PRESENCE_OPTIONAL, 0, "further remarks"),
     TAGS,
     FIELD_REAL(Material, restitution, NULL, WITHIN(0, 1), OPTIONAL, "coefficient of restitution e, for every approach speed"),
     FIELD_REAL(Material, restitution_deviation, NULL, AT_MIN(0), OPTIONAL, "standard deviation of restitution"),
@@ -126,7 +126,7 @@ static Status material_check_ways(const Material *material, const char *pointer,
     const JsonPointer table = json_pointer_of(pointer, "table");
     if (has_table && has_numbers)
         return problem_add(problem, STATUS_INVALID, table.at,
-                           "stands in place of restitution, contact_time and their deviations: "
+                           "replaces restitution, contact_time and their deviations: "
                            "leave one of the two out");
     if (has_table || problem_concerns(problem, table.at))
         return STATUS_OK;
@@ -149,7 +149,7 @@ static Status material_check_base(const Material *material, const char *pointer,
     if (material_has(material->base_mass) && material->base != MATERIAL_BASE_FREE)
         return json_pointer_fault(
             problem, pointer, "base_mass",
-            "is the mass of a free base: say \"base\": \"free\", or leave it out");
+            "is the mass of a free base: write \"base\": \"free\", or leave it out");
     return STATUS_OK;
 }
 

@@ -86,7 +86,7 @@ static Status scene_check_contact(const Scene *scene, const ContactLaw *law, siz
                                                   : "right_buffer",
                  row);
         return problem_add_real(problem, STATUS_INVALID, place, numbers.contact_time, "s",
-                                "must give a stiffness (m_e (pi^2 + ln(e)^2) / T_c^2 or its like) "
+                                "must give a stiffness (m_e (pi^2 + ln(e)^2) / T_c^2 or similar) "
                                 "that numbers can hold");
     }
     return STATUS_OK;

@@ -11,7 +11,7 @@
 static const Field frame_fields[] = {
     FIELD_REALS(ShearFrame, masses, "kg", ABOVE(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the storeys, from the ground up"),
     FIELD_REALS(ShearFrame, stiffnesses, "N/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_REQUIRED, "of the springs below the storeys, from the ground up"),
-    FIELD_REALS(ShearFrame, dampings, "N s/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "of the dampers beside those springs; 0 if no damping is given"),
+    FIELD_REALS(ShearFrame, dampings, "N s/m", AT_MIN(0), STRUCTURE_STOREYS, PRESENCE_OPTIONAL, "of the dampers parallel to those springs; 0 if no damping is given"),
     FIELD_BASE(ShearFrame, structure, structure_fields),
     FIELD_END
 };

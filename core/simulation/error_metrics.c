@@ -16,7 +16,7 @@ const Field error_fields[] = {
     FIELD_REAL(Errors, psd, "dB", ANY, OPTIONAL, "rms distance of the spectra over the band that holds 99.9 % of the reference's power, of the channel with the largest distance; unknown if that band is not covered"),
     FIELD_REAL(Errors, rms_displacement, NULL, ANY, OPTIONAL, "relative difference of the rms displacement of the whole run"),
     FIELD_REAL(Errors, peak_storey_drift, NULL, ANY, OPTIONAL, "relative difference of the largest storey drift of the whole run; unknown where the structure is no frame"),
-    FIELD_REAL(Errors, peak_base_shear, NULL, ANY, OPTIONAL, "likewise of the largest base shear"),
+    FIELD_REAL(Errors, peak_base_shear, NULL, ANY, OPTIONAL, "the same for the largest base shear"),
     FIELD_END
 };
 

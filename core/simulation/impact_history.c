@@ -60,9 +60,9 @@ static Status impact_run_settle(ImpactRun *run, const Simulation *asked,
     const size_t states = 2 * (structure_storeys(scene_structure(scene)) + scene->dampers.count);
     if ((double)states * (double)scene_sample_count(scene) * sizeof(double) > states_bytes_max)
         return problem_set(problem, STATUS_LIMIT,
-                           "the run is too long, or has too many storeys, for one of its impacts "
-                           "to be shown in detail: its states would take more than %g bytes; "
-                           "submit a shorter scene that holds the impact",
+                           "the run is too long, or has too many storeys, to show one impact in "
+                           "detail: its states would need more than %g bytes; submit a shorter "
+                           "scene that contains the impact",
                            states_bytes_max);
     if (simulation_has_target(asked)) {
         Outcome *outcome = NULL;

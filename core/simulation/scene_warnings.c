@@ -20,15 +20,15 @@ typedef struct TypicalLimit {
 } TypicalLimit;
 
 static const TypicalLimit typical[] = {
-    {"clearance", 1, "metres are meant, not millimetres"},
-    {"offset", 1, "metres are meant, not millimetres"},
-    {"position", 1, "metres are meant, not millimetres"},
-    {"displacement", 1, "metres are meant, not millimetres"},
-    {"velocity", 100, "metres per second are meant"},
-    {"contact_time", 1, "seconds are meant, not milliseconds"},
-    {"interval", 1, "seconds are meant, not milliseconds"},
-    {"damping_ratio", 1, "a ratio is meant, not percent"},
-    {"rms", 100, "m/s^2 are meant, not cm/s^2"},
+    {"clearance", 1, "the unit is m, not mm"},
+    {"offset", 1, "the unit is m, not mm"},
+    {"position", 1, "the unit is m, not mm"},
+    {"displacement", 1, "the unit is m, not mm"},
+    {"velocity", 100, "the unit is m/s"},
+    {"contact_time", 1, "the unit is s, not ms"},
+    {"interval", 1, "the unit is s, not ms"},
+    {"damping_ratio", 1, "it is a ratio, not a percentage"},
+    {"rms", 100, "the unit is m/s^2, not cm/s^2"},
 };
 
 static const TypicalLimit *warnings_find_limit(const char *name) {

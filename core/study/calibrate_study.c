@@ -363,12 +363,12 @@ static Status calibrate_check_spectrum(CalibrateWork *work, const MeasuredTarget
     const double misfit = work->is_chaotic ? spectrum_misfit_chaos : spectrum_misfit;
     if (squares <= fmax(misfit, scatter) * expected * bins)
         return STATUS_OK;
-    return status_made(text_format(
-        &work->answer->detail,
-        "the spectrum of %s differs from the best fit by %.2g dB rms where the motion stands out "
-        "from the noise, and %.2g dB would be expected of spectra of this length",
-        residual->channel, residual->deviation * sqrt(squares / bins),
-        residual->deviation * sqrt(expected)));
+    return status_made(
+        text_format(&work->answer->detail,
+                    "the spectrum of %s differs from the best fit by %.2g dB rms where the motion "
+                    "exceeds the noise, and %.2g dB would be expected of spectra of this length",
+                    residual->channel, residual->deviation * sqrt(squares / bins),
+                    residual->deviation * sqrt(expected)));
 }
 
 // Whether residuals differ less from one to the next than those of noise do: the mean square of
@@ -403,8 +403,8 @@ static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
         return status_made(text_format(
             &answer->detail,
             "the differences of %s from the best fit, %.2g %s rms or %.2g %% of the motion, are "
-            "correlated in time, which noise is not: with a deviation that includes the model's "
-            "own error the fit is judged by that",
+            "correlated in time, which noise is not. Give a deviation that includes the error of "
+            "the model itself, and the fit is compared with that",
             name, rms, unit, 100 * rms / motion));
     return warnings_add(&answer->made.warnings, json_pointer_at("/study/measured", c).at,
                         "the differences of %s from the fit, %.2g %s rms, are correlated in time: "

@@ -29,7 +29,7 @@ static const Field ensemble_study_fields[] = {
     FIELD_REAL(EnsembleStudy, target, NULL, ABOVE(0), OPTIONAL, "wanted relative error of the metric's mean, against its mean over all of the runs: no more runs are made than necessary; all are made if absent"),
     FIELD_CHOICE(EnsembleStudy, metric, statistics_metric_names, OPTIONAL, "metric of the target; psd: norm of the difference of the mean densities over the norm of the density, of the channel with the largest error; rms_displacement if absent"),
     FIELD_LIST(EnsembleStudy, inputs, uncertain_input_fields, INPUTS_MAX, PRESENCE_OPTIONAL, "uncertain members of the scene, drawn independently for each run; with inputs the excitation may be of any kind"),
-    FIELD_CHOICE(EnsembleStudy, sampling, sampling_names, OPTIONAL, "points of the draws: independent, a Latin hypercube or a Sobol sequence with a random shift (most uniform if runs is a power of 2), under which intervals of means are on the safe side; random if absent"),
+    FIELD_CHOICE(EnsembleStudy, sampling, sampling_names, OPTIONAL, "points of the draws: independent, a Latin hypercube or a Sobol sequence with a random shift (most uniform if runs is a power of 2). Intervals of means are conservative for the last two; random if absent"),
     FIELD_FLAG(EnsembleStudy, sobol_indices, false, "Sobol indices of the inputs, and of the seed under a random base"),
     FIELD_END
 };
@@ -112,7 +112,7 @@ static const Field ensemble_input_fields[] = {
 };
 
 static const Field ensemble_index_fields[] = {
-    FIELD_TEXT(EnsembleIndex, pointer, 0, PRESENCE_OPTIONAL, 0, "the input, of tied members the first; /excitation/seed stands for the random base"),
+    FIELD_TEXT(EnsembleIndex, pointer, 0, PRESENCE_OPTIONAL, 0, "the input, of tied members the first; /excitation/seed represents the random base"),
     FIELD_CHOICE(EnsembleIndex, metric, statistics_metric_names, OPTIONAL, "metric of the summary"),
     FIELD_BASE(EnsembleIndex, sobol, sobol_index_fields),
     FIELD_END

@@ -140,14 +140,14 @@ static const char *const input_distribution_names[] = {"normal",     "lognormal"
 // clang-format off
 const Field uncertain_input_fields[] = {
     FIELD_BASE(UncertainInput, axis, study_range_fields),
-    FIELD_CHOICE(UncertainInput, distribution, input_distribution_names, REQUIRED, "normal: mean and deviation; lognormal: median and log_deviation; uniform: from and to; triangular: from, mode and to; material: e and T_c of the buffer at pointer, times log-normal factors of mean 1 and the relative deviations that its material records"),
+    FIELD_CHOICE(UncertainInput, distribution, input_distribution_names, REQUIRED, "normal: mean and deviation; lognormal: median and log_deviation; uniform: from and to; triangular: from, mode and to. material: e and T_c of the buffer at pointer, times log-normal factors of mean 1 and the relative deviations that its material records"),
     FIELD_REAL(UncertainInput, mean, NULL, ANY, OPTIONAL, "of normal"),
     FIELD_REAL(UncertainInput, deviation, NULL, ABOVE(0), OPTIONAL, "standard deviation of normal"),
     FIELD_REAL(UncertainInput, median, NULL, ABOVE(0), OPTIONAL, "of lognormal"),
     FIELD_REAL(UncertainInput, log_deviation, NULL, ABOVE(0), OPTIONAL, "of lognormal: standard deviation of the natural logarithm"),
     FIELD_REAL(UncertainInput, mode, NULL, ANY, OPTIONAL, "most probable value of triangular"),
     FIELD_REAL(UncertainInput, restitution_deviation, NULL, WITHIN(0, 1), OPTIONAL, "of material: relative standard deviation of the restitution; if absent the recorded one, 0: exact"),
-    FIELD_REAL(UncertainInput, contact_time_deviation, NULL, WITHIN(0, 1), OPTIONAL, "of material: likewise of the contact time"),
+    FIELD_REAL(UncertainInput, contact_time_deviation, NULL, WITHIN(0, 1), OPTIONAL, "of material: the same for the contact time"),
     FIELD_END
 };
 // clang-format on

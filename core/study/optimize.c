@@ -113,7 +113,7 @@ static const Field optimum_interval_fields[] = {
 static const Field optimum_rival_fields[] = {
     FIELD_LIST(OptimumRival, values, optimum_value_fields, 0, PRESENCE_DEFAULT, "of the variables"),
     FIELD_REAL(OptimumRival, difference, NULL, ANY, OPTIONAL, "its first objective less that of the best"),
-    FIELD_REALS_OR_NULL(OptimumRival, interval_95, NULL, "confidence interval of the mean difference, over the runs in pairs: where it contains 0, the two cannot be told apart"),
+    FIELD_REALS_OR_NULL(OptimumRival, interval_95, NULL, "confidence interval of the mean difference, over the runs in pairs: where it contains 0, the two cannot be distinguished"),
     FIELD_END
 };
 
@@ -132,7 +132,7 @@ static const Field optimum_answer_fields[] = {
     FIELD_ITEM_OR_NULL(Optimum, best, optimum_best_fields, PRESENCE_OPTIONAL, "the best feasible candidate, of two objectives the best compromise; null: none is feasible"),
     FIELD_ITEM(Optimum, given, optimum_scene_fields, NULL, PRESENCE_DEFAULT, "the scene as it is"),
     FIELD_ITEM(Optimum, undamped, optimum_scene_fields, NULL, PRESENCE_DEFAULT, "the same scene without its dampers"),
-    FIELD_LIST(Optimum, region, optimum_interval_fields, 0, PRESENCE_DEFAULT, "a box around the best whose ends are values of candidates: every candidate of the history within all of its intervals keeps the constraints and has an objective within 2 % of the best; equally good candidates beyond worse ones are outside"),
+    FIELD_LIST(Optimum, region, optimum_interval_fields, 0, PRESENCE_DEFAULT, "a box around the best whose ends are values of candidates. Every candidate of the history within all of its intervals keeps the constraints and has an objective within 2 % of the best. Equally good candidates beyond worse ones are outside"),
     FIELD_LIST(Optimum, rivals, optimum_rival_fields, 0, PRESENCE_DEFAULT, "the next best candidates whose values differ clearly"),
     FIELD_LIST(Optimum, front, optimum_candidate_fields, 0, PRESENCE_DEFAULT, "of two objectives: candidates that no other beats in both, by the first"),
     FIELD_LIST(Optimum, history, optimum_candidate_fields, 0, PRESENCE_DEFAULT, "every candidate, in their order"),
@@ -386,7 +386,7 @@ static Status optimize_complete_over(OptimizeStudy *study, const Simulation *sim
                            has_seeds ? "has runs and records: leave one of them out"
                                      : "needs runs, or records");
     if (!has_seeds && over->first_seed != COUNT_ABSENT)
-        return problem_add(problem, STATUS_INVALID, place, "needs runs beside first_seed");
+        return problem_add(problem, STATUS_INVALID, place, "needs runs with first_seed");
     if (has_seeds && excitation_kind(excitation) != &excitation_random)
         return problem_add(problem, STATUS_INVALID, "/study/over/runs",
                            "are seeds of a random base: /excitation/kind must be random, is %s",

@@ -41,7 +41,7 @@ static const char *const curve_direction_names[] = {"up", "down", "both", NULL};
 static const Field response_study_fields[] = {
     FIELD_ITEM(ResponseStudy, axis, study_axis_fields, NULL, PRESENCE_REQUIRED, "the number that varies: a range of from, to and count"),
     FIELD_CHOICE(ResponseStudy, direction, curve_direction_names, CURVE_UP, "up: from, then on to to, each point from the state of the one before; down: the reverse; both: up, then down"),
-    FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "cycles of the sine at each point, at most, before the motion is called aperiodic, though a chaotic one may still end on an orbit after more; fewer where a stable orbit is found earlier, up to three times as many where the motion has not yet left an unstable one"),
+    FIELD_COUNT(ResponseStudy, settle_cycles, NULL, WITHIN(1, CURVE_CYCLES), 200, "maximum number of cycles of the sine at each point before the motion is called aperiodic; a chaotic one may still end on an orbit later. Fewer are used where a stable orbit is found earlier, up to three times as many where the motion has not yet left an unstable one"),
     FIELD_COUNT(ResponseStudy, max_period, NULL, WITHIN(1, CYCLE_FLOW_PERIOD), 8, "longest period searched for, in cycles of the sine"),
     FIELD_FLAG(ResponseStudy, continuation, false, "also follows each branch through its folds by pseudo-arclength continuation, with its unstable orbits: at most four points for each value of the axis, and 200; each one is a run too"),
     FIELD_COUNT(ResponseStudy, section_points, NULL, WITHIN(0, CURVE_SECTION), 64, "points of the section where no periodic orbit is found"),
@@ -624,9 +624,9 @@ static Status curve_warn(CurveWork *work) {
     StudyRuns *made = &work->answer->made;
     if (work->unsettled_count > 0)
         TRY(warnings_add(&made->warnings, "/study/settle_cycles",
-                         "may be too few: beside the motion without a period lies an orbit that is "
-                         "stable, or hardly unstable, or an undamped structure is in resonance, "
-                         "where no number is enough, at %zu of the points, with index %s%s",
+                         "may be too few at %zu of the points, with index %s%s: near the motion "
+                         "without a period is an orbit that is stable or weakly unstable. In "
+                         "resonance of an undamped structure no number is enough",
                          work->unsettled_count, work->unsettled,
                          work->unsettled_count > CURVE_NAMED ? " and more" : ""));
     return study_runs_warn(made);
@@ -663,10 +663,10 @@ static void curve_free(void *of) {
 }
 
 const StudyKind study_response = {
-    .kind =
-        {"response",
-         "steady motion under a sine while a number varies: periodic orbits and their stability, always by the exact solver",
-         response_study_fields, sizeof(ResponseStudy)},
+    .kind = {"response",
+             "steady motion under a sine while a number varies: periodic orbits and their "
+             "stability, always by the exact solver",
+             response_study_fields, sizeof(ResponseStudy)},
     .answer = &(const Kind){"response", "orbits and sections at each value", response_answer_fields,
                             sizeof(ResponseCurve)},
     .shorten = "ask for fewer points, settle_cycles or section_points",

@@ -324,13 +324,13 @@ static const Field sensitivity_spread_fields[] = {
     FIELD_CHOICE(InputDeviation, buffer, sensitivity_buffer_names, 0, "one of its buffers"),
     FIELD_TEXT(InputDeviation, source, 160, PRESENCE_OPTIONAL, 0, "material and revision that the deviations come from"),
     FIELD_REAL(InputDeviation, restitution, NULL, WITHIN(0, 1), OPTIONAL, "relative standard deviation of its restitution; exact if absent"),
-    FIELD_REAL(InputDeviation, contact_time, NULL, WITHIN(0, 1), OPTIONAL, "likewise of its contact time; all rows of a table are scaled by one factor"),
+    FIELD_REAL(InputDeviation, contact_time, NULL, WITHIN(0, 1), OPTIONAL, "the same for its contact time; all rows of a table are scaled by one factor"),
     FIELD_END
 };
 
 static const Field sensitivity_input_fields[] = {
     FIELD_REAL(InputUncertainty, restitution_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "relative standard deviation of every buffer's restitution, 0: exact; if absent that of spread"),
-    FIELD_REAL(InputUncertainty, contact_time_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "likewise of its contact time"),
+    FIELD_REAL(InputUncertainty, contact_time_deviation, NULL, WITHIN(0, 0.5), OPTIONAL, "the same for its contact time"),
     FIELD_LIST(InputUncertainty, spread, sensitivity_spread_fields, DEVIATIONS_MAX, PRESENCE_OPTIONAL, "deviations buffer by buffer; if absent those in the revisions of the buffers' materials, of a table the root mean square of its rows"),
     FIELD_END
 };
@@ -805,7 +805,7 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
               "again"
             : "log-normal factors of mean 1 and the relative deviations of spread, independent for "
               "the restitution and the contact time of each buffer, one factor for all rows of a "
-              "table; a restitution beyond 1 is drawn again",
+              "table. A restitution beyond 1 is drawn again",
         &answer->distribution));
     TRY(fields_copy(sensitivity_uncertainty_fields, &study->uncertainty, &answer->uncertainty));
     TRY(sensitivity_run_scene(work, tools, problem));

@@ -32,7 +32,7 @@ const Field study_answer_fields[] = {
 const Field study_request_fields[] = {
     FIELD_BASE(StudyRequest, simulation, simulation_fields),
     FIELD_VARIANT(StudyRequest, study, &study_kinds, PRESENCE_OPTIONAL,
-                  "a study of the scene, beside its run"),
+                  "a study of the scene, in addition to its run"),
     FIELD_END,
 };
 

@@ -82,7 +82,7 @@ static const Field sweep_answer_fields[] = {
     FIELD_CHOICE(Sweep, mode, sweep_mode_names, OPTIONAL, "combination of the axes"),
     FIELD_LIST(Sweep, axes, sweep_axis_values_fields, 0, PRESENCE_DEFAULT, "members that vary, in the order in which they are set"),
     FIELD_TEXTS(Sweep, metrics, NULL, NULL, 0, PRESENCE_OPTIONAL, 0, "metrics kept of each point"),
-    FIELD_ITEM_OR_NULL(Sweep, table, sweep_table_fields, PRESENCE_OPTIONAL, "the rows, unless they are stored beside the result"),
+    FIELD_ITEM_OR_NULL(Sweep, table, sweep_table_fields, PRESENCE_OPTIONAL, "the rows, unless they are stored next to the result"),
     FIELD_END
 };
 // clang-format on

@@ -74,7 +74,7 @@ Status columns_outcome(App *app, const Request *request, Reply *reply, Outcome *
         reply->retry_after = 2;
     return status == STATUS_OK && *outcome == NULL
                ? columns_wait(request, reply, NULL, NULL,
-                              "the series is still being computed anew; ask again a little later",
+                              "the series is still being computed again; retry a little later",
                               problem)
                : status;
 }

@@ -147,7 +147,7 @@ static Status compare_outcomes(App *app, const Request *request, Reply *reply, s
     return is_complete
                ? STATUS_OK
                : columns_wait(request, reply, sides, compare_free,
-                              "the series are still being computed anew; ask again a little later",
+                              "the series are still being computed again; retry a little later",
                               problem);
 }
 

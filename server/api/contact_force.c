@@ -84,7 +84,7 @@ static Status force_read_scene(App *app, const char *id, Reply *reply, ForceRun 
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0) {
         status = problem_set(problem, STATUS_GONE,
                              "the result was made by %s, this is %s: POST to /again below the "
-                             "result, which submits its scene anew, to see its impacts",
+                             "result, which submits its scene again, to see its impacts",
                              row.engine, engine_version);
         results_link_gone(id, reply);
     }

@@ -97,9 +97,9 @@ static void events_poll(Events *events) {
         events_put_finished(events);
     } else if (atomic_load(&events->app->is_stopping)) {
         bytes_text(&events->text, "event: stopping\n");
-        events_put_data(&events->text,
-                        "{\"detail\": \"the daemon stops; the job goes on when it is "
-                        "started again\"}");
+        events_put_data(
+            &events->text,
+            "{\"detail\": \"the daemon stops; the job continues when it is started again\"}");
         events->is_complete = true;
     } else {
         events_put_progress(events, state, progress);

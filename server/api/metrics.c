@@ -15,8 +15,8 @@ static void metrics_write_layers(Bytes *bytes, const JobStats *stats) {
                   {"layer=\"results\"", &stats->rows},
                   {"layer=\"stored_series\"", &stats->stored}};
     static const char *const families[][3] = {
-        {"impactd_cache_hits_total", "counter", "Looks that found what was known, by layer."},
-        {"impactd_cache_misses_total", "counter", "Looks that did not, by layer."},
+        {"impactd_cache_hits_total", "counter", "Lookups that found a cached result, by layer."},
+        {"impactd_cache_misses_total", "counter", "Lookups that found none, by layer."},
         {"impactd_cache_evictions_total", "counter", "What made room for others, by layer."},
         {"impactd_cache_layer_bytes", "gauge", "What a layer takes, in memory or on disk."}};
     for (size_t k = 0; k < COUNT(families); k++) {
@@ -56,7 +56,7 @@ static void metrics_write_responses(Bytes *bytes, ResponseCache *response_cache)
     metrics_counter(bytes, "impactd_reply_cache_hits_total", "Requests answered by these.",
                     metrics.hits);
     metrics_counter(bytes, "impactd_reply_cache_misses_total",
-                    "Looks for an answer that was not there.", metrics.misses);
+                    "Lookups of a reply that was not cached.", metrics.misses);
     metrics_counter(bytes, "impactd_reply_cache_evictions_total", "Answers that made room.",
                     metrics.evictions);
 }
@@ -70,7 +70,7 @@ static void metrics_write_db(Bytes *bytes, Db *db) {
                     counter_get(&totals->writes));
     metrics_counter(bytes, "impactd_sqlite_rows_total", "Rows inserted, changed or deleted.",
                     counter_get(&totals->rows));
-    metrics_counter(bytes, "impactd_sqlite_errors_total", "Transactions that came to nothing.",
+    metrics_counter(bytes, "impactd_sqlite_errors_total", "Transactions that failed.",
                     counter_get(&totals->errors));
     static const char commits[] = "impactd_sqlite_transaction_seconds";
     metrics_family(bytes, commits, "histogram",

@@ -241,7 +241,7 @@ static const Field record_fields[] = {
     FIELD_TEXT(RecordRow, processing, 0, PRESENCE_OPTIONAL, 0, "what was done to it"),
     FIELD_TEXT(RecordRow, notes, 0, PRESENCE_OPTIONAL, 0, "what else one should know"),
     FIELD_TEXT(RecordRow, layout, 0, PRESENCE_OPTIONAL, 0, "of the file"),
-    FIELD_TEXT(RecordRow, header, 0, PRESENCE_OPTIONAL, 0, "what stands before its numbers"),
+    FIELD_TEXT(RecordRow, header, 0, PRESENCE_OPTIONAL, 0, "what precedes its numbers"),
     FIELD_TEXT(RecordRow, unit, 0, PRESENCE_OPTIONAL, 0, "of the file's numbers, as it was taken"),
     FIELD_TEXT(RecordRow, stated_unit, 0, PRESENCE_OPTIONAL, 0, "as the file states it"),
     FIELD_REAL(RecordRow, interval, "s", ANY, OPTIONAL, "time between samples"),
@@ -249,7 +249,7 @@ static const Field record_fields[] = {
     FIELD_REAL(RecordRow, peak, "m/s^2", ANY, OPTIONAL, "the largest magnitude"),
     FIELD_REAL(RecordRow, peak_time, "s", ANY, OPTIONAL, "when"),
     FIELD_REAL(RecordRow, peak_velocity, "m/s", ANY, OPTIONAL, "of the base, from rest"),
-    FIELD_REAL(RecordRow, end_velocity, "m/s", ANY, OPTIONAL, "likewise, at the end"),
+    FIELD_REAL(RecordRow, end_velocity, "m/s", ANY, OPTIONAL, "the same at the end"),
     FIELD_TEXT(RecordRow, digest, 0, PRESENCE_OPTIONAL, 0, "SHA-256 of interval and samples"),
     FIELD_TEXT(RecordRow, author, 0, PRESENCE_OPTIONAL, 0, "name of the token that sent it"),
     FIELD_END

@@ -21,7 +21,7 @@ const char no_impacts[] =
 void results_link_gone(const char *id, Reply *reply) {
     snprintf(reply->link, sizeof reply->link,
              "</v1/results/%.72s/again>; rel=\"successor-version\"; title=\"POST submits the scene "
-             "anew\", </v1/results/%.72s/manifest>; rel=\"describedby\"",
+             "again\", </v1/results/%.72s/manifest>; rel=\"describedby\"",
              id, id);
 }
 

@@ -52,7 +52,7 @@ const Route routes[] = {
     {"GET",    "/v1/results/{id}/points/{index}",       "read",   NULL,         "One point: its values, metrics and scene", sweeps_point, NULL},
     {"GET",    "/v1/results/{id}",                      "read",   NULL,         "A result's scene, plan, summary and units", results_show, NULL},
     {"DELETE", "/v1/results/{id}",                      "submit", NULL,         "Delete a result; its jobs stay", results_delete, NULL},
-    {"POST",   "/v1/results/{id}/again",                "submit", NULL,         "Submit its scene anew", results_again, NULL},
+    {"POST",   "/v1/results/{id}/again",                "submit", NULL,         "Submit its scene again", results_again, NULL},
     {"GET",    "/v1/results/{id}/manifest",             "read",   NULL,         "Everything needed to reproduce a result", results_manifest, NULL},
     {"GET",    "/v1/results/{id}/series.{format}",      "read",   of_series,    "Time series as json, csv, npy, npz or mat, or a chart as svg; ?points= keeps the extremes of buckets", results_part, NULL},
     {"GET",    "/v1/results/{id}/series",               "read",   of_series,    "Time series, format by Accept", results_part, NULL},

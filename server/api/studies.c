@@ -165,7 +165,7 @@ static Status sweep_reply_chart(App *app, Reply *reply, const TableFormat *forma
     bytes_clear(&bytes);
     return problem_set(
         problem, STATUS_BUSY,
-        "the table's rows were deleted or made anew while they were read; ask again");
+        "the table's rows were deleted or computed again while they were read; ask again");
 }
 
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {

@@ -147,7 +147,7 @@ const Command command_restore = {
         "  impactd restore lab.db --force                 in the place of the folder's database\n"
         "\n"
         "Stop the server first. FILE is copied and checked, and the folder has either the\n"
-        "database of before or the whole of FILE, whatever happens. FILE itself stays as\n"
+        "database of before or the whole of FILE, also after a crash. FILE itself stays as\n"
         "it is. Jobs that were unfinished in the backup are taken up again when the\n"
         "server starts.\n",
     .options = restore_fields,

@@ -110,7 +110,7 @@ static Status job_follow(ApiCall *call, const char *id, FILE *lines, Problem *pr
     int64_t answered_ns = INT64_MIN;
     Status status;
     snprintf(farewell, sizeof farewell,
-             "%s goes on; \"impactd cancel %s\" stops it, \"impactd watch %s\" follows it\n", id,
+             "%s continues; \"impactd cancel %s\" stops it, \"impactd watch %s\" follows it\n", id,
              id, id);
     output_farewell(farewell);
     progress_bar_start(&show.bar);

@@ -213,7 +213,7 @@ static Status certificate_read(const ServeSettings *settings, Problem *problem) 
         return STATUS_OK;
     if (cert == NULL || key == NULL)
         return problem_add(problem, STATUS_USAGE, cert != NULL ? "--tls-cert" : "--tls-key",
-                           "needs %s FILE beside it", cert != NULL ? "--tls-key" : "--tls-cert");
+                           "needs %s FILE too", cert != NULL ? "--tls-key" : "--tls-cert");
     const Status all[] = {pem_read("--tls-cert", cert, false, &cert_text, problem),
                           pem_read("--tls-key", key, true, &key_text, problem)};
     Status status = status_first(all, COUNT(all));

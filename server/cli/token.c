@@ -168,7 +168,7 @@ const Command command_token = {
             "  impactd token list\n"
             "  impactd token revoke lab\n"
             "\n"
-            "Works beside a running server, which follows within a second, and without one.\n"
+            "Works with a running server, which follows within a second, and without one.\n"
             "From the first token on, also if it is revoked, every request needs one; once\n"
             "all are forgotten (forget strikes a revoked one from the list) loopback is open\n"
             "again.\n",

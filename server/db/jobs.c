@@ -328,8 +328,9 @@ static Status search_find_place(Db *db, JobSearch *search, Problem *problem) {
 static Status job_row_mark(JobRow *row) {
     static const char problem[] =
         "{\"type\": \"/problems/internal\", \"title\": \"Internal error\", \"status\": 500, "
-        "\"detail\": \"this job is damaged: its row in the table jobs differs from its checksums; "
-        "impactd check-db lists what is damaged, impactd restore puts a backup in its place\"}";
+        "\"detail\": \"this job is damaged: its row in the table jobs differs from its checksums. "
+        "impactd check-db lists what is damaged, impactd restore replaces the database by a "
+        "backup\"}";
     JobRow mark = {.state = 3, .is_damaged = true, .created_unix_ms = row->created_unix_ms};
     text_fit(mark.id, sizeof mark.id, row->id);
     job_row_clear(row);

@@ -76,7 +76,7 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
         return problem_set(
             problem, status,
             "%s is damaged, or no database of SQLite (%s): put a copy of it back, or "
-            "move it away, with the files beside it, to begin anew",
+            "move it away, with the files next to it, to start with a new database",
             path, sqlite3_errmsg(connection));
     return problem_set(problem, status, "%s failed: %s%s%s", doing, sqlite3_errmsg(connection),
                        has_path ? ", in " : "", has_path ? path : "");

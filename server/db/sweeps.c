@@ -105,10 +105,10 @@ static Status sweep_check_row(Sqlite *database, const char *sql, const SqlColumn
     SweepRow none = {0};
     bool is_there;
     TRY(sqlite_first(database, sql, columns, item, sweep_columns, &none, &is_there, problem));
-    return is_there
-               ? STATUS_OK
-               : problem_set(problem, STATUS_CONFLICT,
-                             "the sweep's rows were deleted or made anew while they were read");
+    return is_there ? STATUS_OK
+                    : problem_set(
+                          problem, STATUS_CONFLICT,
+                          "the sweep's rows were deleted or computed again while they were read");
 }
 
 typedef struct SweepRead {

@@ -6,7 +6,7 @@
 #include "server/util/gzip.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ && sizeof(double) == 8,
-               "numbers are written as they lie in memory, and the formats say little-endian");
+               "numbers are written as they are in memory, and the formats say little-endian");
 
 enum { FIRST_SEGMENTS = 16, PIECE_BYTES = 8192 };
 

@@ -165,9 +165,9 @@ Status table_stream_downsample(TableStream *stream, size_t points, Problem *prob
 // The first piece is made here, so that most faults are found before anything is sent.
 Status table_stream_check(const TableStream *stream, Problem *problem) {
     return stream->is_broken != NULL && *stream->is_broken
-               ? problem_set(
-                     problem, STATUS_BUSY,
-                     "the table's rows were deleted or made anew while they were read; ask again")
+               ? problem_set(problem, STATUS_BUSY,
+                             "the table's rows were deleted or computed again while they were "
+                             "read; ask again")
                : STATUS_OK;
 }
 

@@ -247,8 +247,7 @@ Status reply_range(Reply *reply, const Request *request, Problem *problem) {
     reply_clear(reply);
     reply->code = 416;
     snprintf(reply->content_range, sizeof reply->content_range, "bytes */%zu", size);
-    return problem_set(problem, STATUS_USAGE, "the range lies outside the %zu bytes there are",
-                       size);
+    return problem_set(problem, STATUS_USAGE, "the range is outside the %zu bytes there are", size);
 }
 
 void reply_link_next(const Request *request, Reply *reply, const char *name, const char *value) {

@@ -59,7 +59,7 @@ static Status add_query(Request *request, char *pair, Problem *problem) {
             "the query holds a broken escape; write %% and two hexadecimal digits, not 00");
     if (request_query(request, pair) != NULL)
         return problem_set(problem, STATUS_USAGE,
-                           "the query parameter \"%.40s\" stands twice; give it once", pair);
+                           "the query parameter \"%.40s\" is given twice; give it once", pair);
     if (request->query_count == REQUEST_QUERIES)
         return problem_set(problem, STATUS_USAGE, "more than %d query parameters", REQUEST_QUERIES);
     request->queries[request->query_count++] = (RequestPair){pair, value};
@@ -352,7 +352,7 @@ int request_validate(Request *request, const AcceptedHosts *hosts, const char *t
         (length[0] == '\0' || strlen(length) > 18 || length[strspn(length, "0123456789")] != '\0'))
         return head_refuse(problem, 400, "Content-Length must be a plain number");
     if (length != NULL && encoding != NULL)
-        return head_refuse(problem, 400, "Content-Length beside Transfer-Encoding");
+        return head_refuse(problem, 400, "Content-Length together with Transfer-Encoding");
     if (encoding != NULL && !request->is_chunked)
         return head_refuse(problem, 501, "the only Transfer-Encoding understood is \"chunked\"");
     if (encoding != NULL && is_1_0)
@@ -524,7 +524,7 @@ Status request_read_document(const Request *request, const Field *fields, void *
                              Problem *problem) {
     if (request->query_count > 0)
         return problem_set(problem, STATUS_USAGE,
-                           "beside JSON there is no query: \"%.40s\" is a member of the document",
+                           "a JSON body allows no query: \"%.40s\" is a member of the document",
                            request->queries[0].name);
     return json_parse(request->body, request->body_size, fields, item, problem);
 }

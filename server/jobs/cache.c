@@ -185,14 +185,14 @@ static Status series_prepare(JobManager *manager, Task *task, Problem *problem) 
     if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0)
         status = problem_set(problem, STATUS_GONE,
                              "the series was made by %s, this is %s: to have it again, POST to "
-                             "/v1/results/%.72s/again, which submits the scene anew",
+                             "/v1/results/%.72s/again, which submits the scene again",
                              row.engine, engine_version, task->result);
     if (status == STATUS_OK)
         status = jobs_prepare_stored(manager->db, row.scene, task->result, &task->inquiry, &is_same,
                                      problem);
     if (status == STATUS_OK && !is_same)
         status = problem_set(problem, STATUS_INTERNAL,
-                             "the stored scene no longer stands for this result");
+                             "the stored scene no longer belongs to this result");
     result_row_clear(&row);
     return status;
 }

@@ -228,7 +228,7 @@ static Status sweep_begin(StudyRun *run, size_t slots, Problem *problem) {
     TRY(db_sweep_begin(db, row, problem));
     if (row->points != points || row->metrics != metrics)
         return problem_set(problem, STATUS_INTERNAL,
-                           "the stored sweep no longer stands for this scene");
+                           "the stored sweep no longer belongs to this scene");
     return STATUS_OK;
 }
 

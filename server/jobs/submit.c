@@ -513,7 +513,7 @@ static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Pro
     if (status == STATUS_OK && !is_same)
         status = problem_set(problem, STATUS_GONE,
                              "the sweep was made by another engine version, this is %s: POST to "
-                             "/v1/results/%.72s/again, which submits its scene anew",
+                             "/v1/results/%.72s/again, which submits its scene again",
                              engine_version, row->result);
     study_request_clear(&request);
     return status;

@@ -177,7 +177,7 @@ Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, S
     TRY(sweep_describe(sweep_view_study(view), &view->inquiry.simulation, view->sweep, problem));
     if (view->row.chunks > 0 && view->row.metrics != sweep_view_study(view)->metrics.count)
         return problem_set(problem, STATUS_INTERNAL,
-                           "the stored rows no longer stand for this scene");
+                           "the stored rows no longer belong to this scene");
     TRY(db_sweep_chunks(db, view->row.number, &view->chunks, problem));
     view->is_complete = view->row.chunks > 0 && view->chunks.count == view->row.chunks;
     for (size_t i = 0; i < view->chunks.count; i++) {

@@ -788,7 +788,7 @@ static Status part_syntax_error(const Part *part, const json_error_t *error, Pro
         enum json_error_code code;
         const char *sentence;
     } sentences[] = {
-        {json_error_duplicate_key, "the key stands twice in its object"},
+        {json_error_duplicate_key, "the key occurs twice in its object"},
         {json_error_numeric_overflow,
          "the number is too large: reals go to 1.797e308, whole numbers to 9223372036854775807"},
         {json_error_premature_end_of_input, "the document ends before it is complete"},
@@ -805,7 +805,7 @@ static Status part_syntax_error(const Part *part, const json_error_t *error, Pro
             sentence = sentences[i].sentence;
     if (strncmp(sentence, "invalid token", 13) == 0) {
         snprintf(token, sizeof token,
-                 "%s; a number is like 0.5 or 2e-3 (not NaN, .5 or 01), a text stands in quotes",
+                 "%s; a number is like 0.5 or 2e-3 (not NaN, .5 or 01), a text is in quotes",
                  error->text);
         sentence = token;
     }

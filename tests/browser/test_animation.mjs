@@ -49,5 +49,5 @@ test("The player by keyboard: scrub, play, pause", async ({ page, daemon, url })
 test("A result without the channels says which", async ({ page, daemon, url }) => {
   const { result } = await daemon.run("paper_free_sponge", { output: { channels: ["displacement"] } });
   await page.goto(url(`#/results/${result}`));
-  await says(page.getByRole("region", { name: "In slow motion" }), /does not hold damper_displacement/);
+  await says(page.getByRole("region", { name: "In slow motion" }), /does not contain damper_displacement/);
 });

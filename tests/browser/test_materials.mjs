@@ -165,7 +165,7 @@ test("A revision is reviewed, compared and reverted; who writes second is told w
   refused(412);
   await daemon.ask("POST", "/v1/materials/felt/revisions", { ...felt, restitution: 0.35, comment: "a third sheet" }, { "If-Match": "*" });
   await page.getByRole("button", { name: "Revert to revision 1" }).click();
-  await says(main(page), /Somebody wrote meanwhile.*a third sheet.*0\.33\s+0\.35/s);
+  await says(main(page), /Another client changed it meanwhile.*a third sheet.*0\.33\s+0\.35/s);
   await page.getByRole("button", { name: "Do mine all the same" }).click();
   await says(main(page), /felt@4 of 4/);
   assert.equal((await daemon.get("/v1/materials/felt@4")).restitution, 0.3);

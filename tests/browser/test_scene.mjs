@@ -7,7 +7,7 @@ const clearance = (page) => page.getByRole("textbox", { name: "Clearance" }).fir
 const box = (page, name) => page.getByRole("textbox", { name, exact: false }).first();
 const shows = (page, pattern) => until(`a drawing of ${pattern}`,
   async () => pattern.test(await page.getByRole("img", { name: /structure|storeys/i }).first().getAttribute("aria-label")));
-const outcome = (page) => page.getByRole("heading", { name: "What it comes to" }).locator("..");
+const outcome = (page) => page.getByRole("heading", { name: "Estimate" }).locator("..");
 const run = (page) => page.getByRole("button", { name: "Run", exact: true });
 
 // The scene as the page would send it.

@@ -16,7 +16,7 @@ function show(host, context) {
   const [displacement, ofDamper, force] = ["displacement", "damper_displacement", "contact_force"].map(channel);
   const needed = [...drawn.storeys.map(displacement), ...drawn.dampers.map(ofDamper)];
   const isHeld = (name) => result.channels.includes(name), missing = needed.filter((name) => !isHeld(name));
-  if (missing.length) return host.append(`Nothing to play: this result does not hold ${missing.join(", ")}.`);
+  if (missing.length) return host.append(`Nothing to play: this result does not contain ${missing.join(", ")}.`);
   const channels = [...needed, ...drawn.dampers.map(force).filter(isHeld)];
   const length = Math.floor(PIECE / channels.length) / rate; // of a piece (s)
   let from = 0, to = 0, t = 0, seen = {}, held = null, playing = false, noted = 0;

@@ -58,7 +58,7 @@ async function compare(host, runs) {
     divergence: pairs[at - 1]?.divergence, level: pairs[at - 1]?.psd?.[0]?.level }));
   const fields = JSON.stringify(await schema("scene"));
   const push = h("div"), motion = h("div"), spectrum = h("div");
-  fill(host, panel("What it comes to", lesson(...others.map((other) => pushes(first, other)), partings(runs).said),
+  fill(host, panel("Result", lesson(...others.map((other) => pushes(first, other)), partings(runs).said),
     h("div.columns", null, push, numbers(runs, first.units, []))), panel("Motion", motion), panel("Spectra", spectrum),
   panel("Inputs", differing("Inputs that differ", runs, all.map(([input, values]) =>
     ({ label: title(place(input)), unit: unitOf(input, fields), values }))),

@@ -40,7 +40,7 @@ export const writeForm = (name, value, label, seen, part, options) => schemaForm
   } catch (error) {
     if (error.status !== 412) throw error;
     const now = await readMaterial(seen.slug);
-    fill(outcome, notice("warn", "Somebody wrote meanwhile", h("p", null, "Yours is not lost. Since you read it:"),
+    fill(outcome, notice("warn", "Another client changed it meanwhile", h("p", null, "Yours is not lost. Since you read it:"),
       await differences(seen.slug, seen.latest, now.latest), h("button", null, "Do mine all the same")));
     outcome.querySelector("button").focus();
     seen = now;

@@ -25,7 +25,7 @@ function changes(material, properties) {
   return panel("Review and change",
     folded("Approve or deprecate it", () => writeForm("material_review", { status: "approved" }, "Review it", material,
       `@${material.revision}/review`), material.status === "draft"),
-    folded("Change what it says", () => writeForm("material_revision", said, "Make it a revision", material, "/revisions")));
+    folded("Edit it", () => writeForm("material_revision", said, "Make it a revision", material, "/revisions")));
 }
 
 const DONE = { measure: "Kept", approve: "Approved", deprecate: "Deprecated", revert: "Reverted by", import: "Took in" };

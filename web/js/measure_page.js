@@ -56,7 +56,7 @@ async function entry(host, { slug }, signal) {
     widgets: [[/^.drops$/, dropGrid], [/^.traces.\d+.force$/, traceWidget],
       [/interval$/, () => ({ element: h("div", { hidden: true }), refresh() {} })]] }); // a trace's file tells it
   fill(host, h("div.columns", { onkeydown: (event) => event.key === "Enter" && event.ctrlKey && button.click() },
-    panel("What was read", fields), panel("What it comes to", out, button, outcome)));
+    panel("What was read", fields), panel("Result", out, button, outcome)));
   draft.onChange(({ pointer }) => {
     if (pointer === undefined || button.disabled) return;
     turn++;
@@ -75,7 +75,7 @@ async function proposal(host, material, measurements) {
   fill(host, h("div.columns", null, panel(`What comes of test ${measurements}`, found.revision === null
     ? notice("warn", "No revision", h("p", null, found.why))
     : await writeForm("material_revision", found.revision, `Make it revision ${seen.latest + 1}`, seen, "/revisions")),
-  panel("What it comes to", results(found))));
+  panel("Result", results(found))));
   host.querySelector("form > button")?.focus();
 }
 

@@ -12,7 +12,7 @@ const COLUMNS = ["name", "earthquake", "station", "duration", "peak", "interval"
   numeric: at > 2, value: (row) => row[name],
   cell: (row) => (at === 0 ? h("a", { href: link(`records/${row.name}`) }, row.name) : told(name, row[name])) }));
 
-const text = { type: "string" }, untold = "where the file does not tell it";
+const text = { type: "string" }, untold = "if the file does not state it";
 const UPLOAD = { required: ["file", "name"], properties: {
   file: {},
   name: { ...text, description: "letters, digits, . _ -" }, unit: { enum: ["m/s^2", "g", "cm/s^2"], description: untold },
@@ -26,7 +26,7 @@ function chooser(context) {
     draft.set(pointer, file);
     draft.set("/name", file?.name.replace(/\.\w*$/, "").replace(/\W+/g, "_"));
   } });
-  const { element } = frame(context, input, "PEER's AT2, times beside accelerations, or one column");
+  const { element } = frame(context, input, "PEER's AT2, times with accelerations, or one column");
   return { element: h("div", null, element), refresh() {} };
 }
 

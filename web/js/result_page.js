@@ -89,7 +89,7 @@ export const page = {
       if (context.view !== view) context.lead(part); // it changed meanwhile
     }));
     await open(host, [...(result.study ? [{ title: STUDIES[result.study.kind], show: showStudy }] : sections), take]);
-    if (result.study) host.append(folded("The run of the scene as it stands, without the study", () => {
+    if (result.study) host.append(folded("The run of the unchanged scene, without the study", () => {
       const inner = h("div");
       open(inner, sections);
       return inner;

@@ -43,7 +43,7 @@ async function show(host, address, signal) {
     h("p", null, "A free mass between two buffered stops in a structure: change what you like. ",
       button("Examples", examplesDialog)), told,
     h("div.scene", null, h("div", null, steps), h("div.beside", null, drawn,
-      h("div", null, h("p", null, run), panel("What it comes to", state, comes)))));
+      h("div", null, h("p", null, run), panel("Estimate", state, comes)))));
   const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 

@@ -7,7 +7,7 @@ export const page = {
   async show(host) {
     const text = await (await ask("GET", "", { headers: { Accept: "text/plain" } })).text();
     fill(host, h("h1", null, "For the shell"),
-      h("p", null, "Everything here is also there for scripts. These lines run as they stand; ",
+      h("p", null, "Scripts can do everything that this page can. These lines run as printed; ",
         h("a", { href: "openapi.json" }, "openapi.json"), " has the whole contract."),
       copied(text));
   },

@@ -100,7 +100,7 @@ TEST(what_cannot_be_there_is_told_and_changes_nothing) {
         {"/dampers/0/identified_for", "\"me\"", "must be one of scene, rig, is \"me\""},
         {"/dampers/0/buffer", "3", "must be a name, is a number"},
         {"/accuracy/solver", "\"euler\"", "must be one of auto"},
-        {"/dampers/0/clearence", "1", "clearance is meant"},
+        {"/dampers/0/clearence", "1", "did you mean clearance?"},
         {"/dampers/1/mass", "1", "the scene has 1 dampers"},
         {"/dampers/-1/mass", "1", "the scene has 1 dampers"},
         {"/dampers/0", "1", "name a member of it"},

@@ -38,14 +38,14 @@ TEST(implausible_values_get_a_warning_each) {
     scene_start(&simulation, -15, 0);
     assert_int_equal(complete(&simulation), STATUS_OK);
     assert_string_equal(verdict_warning(&seen, "/dampers/0/clearance"),
-                        "is 15 m, more than 1 m: metres are meant, not millimetres");
+                        "is 15 m, more than 1 m: the unit is m, not mm");
     verdict_begins(verdict_warning(&seen, "/dampers/0/position"), "is -2 m");
     assert_string_equal(verdict_warning(&seen, "/dampers/0/mass"),
                         "is 110.7 kg, more than the structure's 1.35 kg");
     assert_string_equal(verdict_warning(&seen, "/dampers/0/buffer/contact_time"),
-                        "is 25 s, more than 1 s: seconds are meant, not milliseconds");
+                        "is 25 s, more than 1 s: the unit is s, not ms");
     assert_string_equal(verdict_warning(&seen, "/structure/damping_ratio"),
-                        "is 1.6, more than 1: a ratio is meant, not percent");
+                        "is 1.6, more than 1: it is a ratio, not a percentage");
     verdict_begins(verdict_warning(&seen, "/excitation/displacement"), "is -15 m, more than 1 m");
     verdict_begins(verdict_warning(&seen, "/duration"), "is 0.1 s, less than one period");
     verdict_begins(verdict_warning(&seen, "/sample_rate"), "is 5 Hz, fewer than two samples");

@@ -250,7 +250,7 @@ TEST_IN(what_is_not_json_has_line_column_and_pointer, set_up, tear_down) {
     check_unreadable("{\"parts\": [{}, {\"damping\": 123456789012345678901}]}", "/parts/1/damping",
                      "line 1, column 48: the number is too large");
     check_unreadable("{\"mass\": 1, \"mass\": 2}", "/mass",
-                     "line 1, column 18: the key stands twice in its object");
+                     "line 1, column 18: the key occurs twice in its object");
     check_unreadable("{\"parts\": [{}, {}, {\"a\": 1, \"\\u0061\": 2}]}", "/parts/2/a",
                      "line 1, column 36: the key stands twice");
     check_unreadable("{\"title\": \"\xC3\xBC\xFF\"}", "/title",

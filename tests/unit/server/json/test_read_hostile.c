@@ -157,7 +157,7 @@ TEST(deep_duplicates_are_told_by_pointer) {
         STATUS_UNREADABLE);
     assert_string_equal(problem.faults[0].pointer, "/a/1/b~1c/\xC3\xBC");
     assert_string_equal(problem.faults[0].detail,
-                        "line 2, column 17: the key stands twice in its object");
+                        "line 2, column 17: the key occurs twice in its object");
 }
 
 TEST(long_texts_are_cut_in_the_answer) {
