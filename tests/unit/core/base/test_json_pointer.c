@@ -107,12 +107,12 @@ TEST(what_cannot_be_there_is_told_and_changes_nothing) {
         {"/dampers", "1", "name a member of it"},
         {"/structure", "1", "name a member of it"},
         {"/title", "\"a\"", "name a member of it"},
-        {"/structure/mass/0", "1", "nothing lies below mass"},
-        {"/contact/model/x", "1", "nothing lies below it"},
+        {"/structure/mass/0", "1", "there is nothing below mass"},
+        {"/contact/model/x", "1", "there is nothing below it"},
         {"/excitation/displacement/1", "1", "elements 0 to 0"},
         {"mass", "1", "must begin with a slash"},
         {"", "1", "must begin with a slash"},
-        {"/a~", "1", "~ stands without"},
+        {"/a~", "1", "~ is not followed"},
     };
     scene_start(&simulation, 0.01, 0);
     for (size_t i = 0; i < COUNT(cases); i++) {

@@ -198,7 +198,7 @@ TEST(garbage_is_told_with_line_and_column) {
     } rows[] = {
         {"  0.10000-0.20000\n", "line 2, column 3", "run together, is 0.10000-0.20000"},
         {"1.5.5 1\n", "line 2, column 1", "run together"},
-        {"1 ********\n", "line 2, column 3", "stars stand for one that was too long"},
+        {"1 ********\n", "line 2, column 3", "stars replace one that was too long"},
         {"1\tNaN\n", "line 2, column 3", "must be a finite number, is NaN"},
         {"-Infinity 2\n", "line 2, column 1", "finite"},
         {"1e999 2\n", "line 2, column 1", "that a double can hold"},

@@ -116,11 +116,11 @@ static const Case cases[] = {
     {"k and c, impulse", NO, NO, 1000, 1, &contact_impulse, "/dampers/0/buffer/restitution",
      "is required by the contact model impulse"},
     {"T_c alone", NO, 0.02, NO, NO, &contact_spring_damper, "/dampers/0/buffer/restitution",
-     "is required beside contact_time"},
+     "is required with contact_time"},
     {"k alone", NO, NO, 1000, NO, &contact_spring_damper, "/dampers/0/buffer/damping",
-     "is required beside stiffness"},
+     "is required with stiffness"},
     {"c alone", NO, NO, NO, 1, &contact_spring_damper, "/dampers/0/buffer/stiffness",
-     "is required beside damping"},
+     "is required with damping"},
     {"e and k", 0.6, NO, 1000, NO, &contact_spring_damper, "/dampers/0/buffer",
      "must be given in one way"},
     {"all four", 0.6, 0.02, 1000, 1, &contact_impulse, "/dampers/0/buffer",
@@ -196,11 +196,11 @@ TEST(each_side_has_one_buffer) {
     assert_int_equal(complete(&damper, &contact_impulse), STATUS_INVALID);
     assert_int_equal(problem.count, 1);
     assert_memory_equal(detail_at(&problem, "/dampers/0/buffer"),
-                        "is required: nothing stands at the stops", 40);
+                        "is required: there is no buffer at the stops", 44);
     set_measured(&damper.left_buffer, 0.5, 0.02);
     assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_INVALID);
     assert_memory_equal(detail_at(&problem, "/dampers/0/buffer"),
-                        "is required: nothing stands at the right stop", 45);
+                        "is required: there is no buffer at the right stop", 49);
     set_measured(&damper.right_buffer, 0.6, 0.02);
     assert_int_equal(complete(&damper, &contact_spring_damper), STATUS_OK);
     set_measured(&damper.buffer, 0.7, 0.02);

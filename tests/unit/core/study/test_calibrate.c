@@ -251,7 +251,7 @@ TEST(residuals_that_are_no_noise_are_not_explained_unless_a_deviation_includes_t
     parameter_add(&request, "/structure/stiffness", 700, 1000);
     Calibration *answer = calibrate(&request);
     assert_int_equal(answer->verdict, CALIBRATE_NOT_EXPLAINED);
-    assert_non_null(strstr(answer->detail, "a deviation that includes the model's own error"));
+    assert_non_null(strstr(answer->detail, "a deviation that includes the error of the model"));
     variant_free(&answer->variant);
     study_of(&request)->measured.at[0].deviation = deviation;
     answer = calibrate(&request);
@@ -283,7 +283,7 @@ TEST(a_spectrum_whose_peak_no_value_gives_is_not_explained) {
     parameter_add(&request, "/structure/stiffness", 400, 450);
     Calibration *answer = calibrate(&request);
     assert_int_equal(answer->verdict, CALIBRATE_NOT_EXPLAINED);
-    assert_non_null(strstr(answer->detail, "stands out from the noise"));
+    assert_non_null(strstr(answer->detail, "exceeds the noise"));
     variant_free(&answer->variant);
     study_request_clear(&request);
 }

@@ -201,7 +201,7 @@ TEST_IN(a_database_of_another_program_is_refused_and_left_alone, make_folder, re
     problem_clear(&problem);
     assert_int_equal(db_open(folder, &db, &problem), STATUS_IO);
     assert_non_null(strstr(problem.detail, "impactd.db is damaged"));
-    assert_non_null(strstr(problem.detail, "to begin anew"));
+    assert_non_null(strstr(problem.detail, "to start with a new database"));
 }
 
 static void note_done(void *context, Status status, const char *detail) {

@@ -252,7 +252,7 @@ TEST_IN(what_is_not_json_has_line_column_and_pointer, set_up, tear_down) {
     check_unreadable("{\"mass\": 1, \"mass\": 2}", "/mass",
                      "line 1, column 18: the key occurs twice in its object");
     check_unreadable("{\"parts\": [{}, {}, {\"a\": 1, \"\\u0061\": 2}]}", "/parts/2/a",
-                     "line 1, column 36: the key stands twice");
+                     "line 1, column 36: the key occurs twice");
     check_unreadable("{\"title\": \"\xC3\xBC\xFF\"}", "/title",
                      "line 1, column 13: the text is not UTF-8");
     check_unreadable("{\"title\": \"a\\u0000\"}", "/title", "line 1, column");
