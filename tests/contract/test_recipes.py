@@ -11,6 +11,7 @@ as a terminal does. The words after the opening ``` say what a block is:
     json fragment  members of a document; must be JSON, with "..." anywhere it is only shown
     text output    the output of the block before; "..." or an ellipsis stands for any text
     LANGUAGE NAME  a word with a dot, such as tower.json: the block is also saved as this file
+    LANGUAGE PATH  a word with a slash and a dot: an excerpt of this source file; lines of "..." leave lines out
     ... not-run    shown only; a reason may follow. Other languages and `text` are shown only, too
 
 http://127.0.0.1:8080 and localhost:8080 become the address of the page's daemon; IMPACTD_SERVER is that
@@ -67,6 +68,7 @@ class Block:
         self.text, self.line = text, line
         self.is_run = not any(word.startswith("not-run") for word in self.words)
         self.file = next((word for word in self.words if re.fullmatch(r"[\w-]+(\.\w+)+", word)), None)
+        self.source = next((word for word in self.words if re.fullmatch(r"[\w/-]+/[\w-]+(\.\w+)+", word)), None)
 
 
 def blocks(path):
@@ -74,14 +76,14 @@ def blocks(path):
     found, opened = [], None
     with open(os.path.join(program.SOURCE, path), encoding="utf-8") as file:
         for number, line in enumerate(file, 1):
-            fence = re.match(r"(`{3,})(.*)$", line)
+            fence = re.match(r"( *)(`{3,})(.*)$", line)
             if opened is None and fence:
-                opened = (fence[1], fence[2].strip(), number + 1, [])
-            elif opened and fence and fence[1] == opened[0] and not fence[2].strip():
+                opened = (fence[2], fence[3].strip(), number + 1, [], len(fence[1]))
+            elif opened and fence and fence[2] == opened[0] and not fence[3].strip():
                 found.append(Block(opened[1], "".join(opened[3]), opened[2]))
                 opened = None
             elif opened:
-                opened[3].append(line)
+                opened[3].append(re.sub(f"^ {{0,{opened[4]}}}", "", line))
     assert opened is None, f"{path}:{opened[2]}: the block is not closed"
     return found
 
@@ -193,8 +195,21 @@ class Page:
             return None
         return f"the output is not the printed one but:\n{self.output}"
 
+    @staticmethod
+    def quote(block):
+        """What of an excerpt is not in its source file, or None."""
+        with open(os.path.join(program.SOURCE, block.source), encoding="utf-8") as file:
+            rest = file.read()
+        for part in re.split(r"^ *\.\.\.\n", block.text, flags=re.M):
+            before, found, rest = rest.partition(part)
+            if not found:
+                return f"not in {block.source}:\n{part}"
+        return None
+
     def block(self, block):
         """What is wrong with a block, or None."""
+        if block.source:
+            return self.quote(block)
         if block.file:
             with open(os.path.join(self.folder, block.file), "w", encoding="utf-8") as file:
                 file.write(block.text)
@@ -226,7 +241,7 @@ def check(path):
     hidden = [] if path == "README.md" else hidden_commands(path)
     assert not hidden, f"{path}:{hidden[0]}: commands belong in a ```sh block"
     found = blocks(path)
-    if not any(block.is_run and block.language in (*INTERPRETERS, "json", "text") for block in found):
+    if not any(block.source or (block.is_run and block.language in (*INTERPRETERS, "json", "text")) for block in found):
         return
     with program.daemon() as daemon, tempfile.TemporaryDirectory() as folder:
         page = Page(path, daemon, folder)
@@ -260,6 +275,7 @@ def test_a_fault_is_found_at_its_line():
              '```json\n{"structure": {"mass": -1}}\n```\n': "must be above 0 kg",
              '```json\n{"slug": "a", "colour": 1}\n```\n': "neither a scene nor another body",
              '```json fragment\n"a": 1, b\n```\n': "not JSON",
+             "```c core/contact/contacts.c\n    &contact_auto,\n    ...\n    &contact_new,\n```\n": "not in core/contact/contacts.c:\n    &contact_new",
              "A line\n\n    impactd run scene.json\n": "commands belong in"}
     with tempfile.TemporaryDirectory() as folder:
         for text, fault in pages.items():

@@ -1,4 +1,4 @@
-// The contact law that core/README.md shows as an example, compiled from that page.
+// The contact law that web/guide/extending.md shows as an example, compiled from that page.
 #include <math.h>
 
 #include "core/contact/contact.h"
