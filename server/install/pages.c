@@ -153,30 +153,46 @@ static const char *kind_name(const Field *row) {
     return (size_t)row->kind < COUNT(names) && names[row->kind] != NULL ? names[row->kind] : "";
 }
 
-// "number [kg], above 0; required"
-static void nature_print(FILE *file, const Field *row) {
+// "number [kg], above 0"
+static void nature_write(const Field *row, Bytes *bytes) {
     char least[32], most[32];
-    fputs(kind_name(row), file);
-    unit_print(file, row);
+    bytes_text(bytes, kind_name(row));
+    if (row->unit != NULL)
+        bytes_format(bytes, " [%s]", row->unit);
     const bool has_range = row->kind == FIELD_KIND_REAL || row->kind == FIELD_KIND_COUNT ||
                            row->kind == FIELD_KIND_REALS || row->kind == FIELD_KIND_ROWS;
     if (has_range && isfinite(row->range.min) && isfinite(row->range.max))
-        fprintf(file, ", %s to %s", text_real(least, row->range.min),
-                text_real(most, row->range.max));
+        bytes_format(bytes, ", %s to %s", text_real(least, row->range.min),
+                     text_real(most, row->range.max));
     else if (has_range && isfinite(row->range.min))
-        fprintf(file, ", %s %s", row->range.is_open_below ? "above" : "at least",
-                text_real(least, row->range.min));
-    for (size_t i = 0; row->choices != NULL && row->choices[i] != NULL; i++) {
-        fputs(i > 0 ? ", " : ": ", file);
-        escaped(file, row->choices[i], false);
-    }
+        bytes_format(bytes, ", %s %s", row->range.is_open_below ? "above" : "at least",
+                     text_real(least, row->range.min));
+    for (size_t i = 0; row->choices != NULL && row->choices[i] != NULL; i++)
+        bytes_format(bytes, "%s%s", i > 0 ? ", " : ": ", row->choices[i]);
+}
+
+// "required", "0"; "" where there is no default.
+static void default_write(const Field *row, Bytes *bytes) {
+    char text[32];
     if (row->presence == PRESENCE_REQUIRED)
-        fputs("; required", file);
+        bytes_text(bytes, "required");
     else if (row->presence == PRESENCE_DEFAULT && row->kind == FIELD_KIND_CHOICE)
-        fprintf(file, "; default %s", row->choices[(int)row->initial]);
+        bytes_text(bytes, row->choices[(int)row->initial]);
     else if (row->presence == PRESENCE_DEFAULT &&
              (row->kind == FIELD_KIND_REAL || row->kind == FIELD_KIND_COUNT))
-        fprintf(file, "; default %s", text_real(least, row->initial));
+        bytes_text(bytes, text_real(text, row->initial));
+}
+
+static void nature_print(FILE *file, const Field *row) {
+    Bytes nature = {.most = 0}, initial = {.most = 0};
+    nature_write(row, &nature);
+    default_write(row, &initial);
+    escaped(file, nature.at, false);
+    if (initial.count > 0)
+        fputs(row->presence == PRESENCE_REQUIRED ? "; " : "; default ", file);
+    escaped(file, initial.count > 0 ? initial.at : "", false);
+    bytes_clear(&nature);
+    bytes_clear(&initial);
 }
 
 static void rows_print(FILE *file, const Field *fields, const char *place) {
