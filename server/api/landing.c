@@ -90,11 +90,6 @@ const EmbeddedFile *guide_files;
 
 Status guide_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)app;
-    if (strcmp(request->path, "/guide") == 0) {
-        text_fit(reply->location, sizeof reply->location, "/guide/");
-        reply_borrow(reply, 308, NULL, NULL, 0);
-        return STATUS_OK;
-    }
     const bool is_index = strcmp(request->path, "/guide/") == 0;
     return asset_reply(guide_files, is_index ? "guide/index.html" : request->path + 1, request,
                        reply, problem);

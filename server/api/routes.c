@@ -131,7 +131,6 @@ const Route routes[] = {
     {"GET",    "/web/{file}",                           "open",   NULL,         "A file of the dashboard", assets_show, NULL},
     {"GET",    "/guide/{file}",                         "open",   NULL,         "A page or a picture of the guide", guide_show, NULL},
     {"GET",    "/guide/",                               "open",   NULL,         "The first page of the guide", guide_show, NULL},
-    {"GET",    "/guide",                                "open",   NULL,         "Redirects to /guide/", guide_show, NULL},
     {"GET",    "/problems/{name}",                      "open",   NULL,         "Redirects to the section of the guide on a type of problem", problems_show, NULL},
     {"GET",    "/client/impactd",                       "open",   NULL,         "Links to the wheel, as pip --index-url reads them", client_files_list, NULL},
     {"GET",    "/client/{file}",                        "open",   NULL,         "A client for Python (a file or a wheel), Octave or MATLAB, or its notebook", client_files_show, NULL},

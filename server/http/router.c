@@ -115,25 +115,27 @@ static bool route_nearest(const Route *table, const char *path, char target[PATH
     return target[0] != '\0';
 }
 
-// A path that a route fits without the slash at its end. Folders of the documentation and of the
-// dashboard are not meant.
+// A path that a route fits with a slash at its end ("/guide/"), or without the one that it has.
+// Folders of the documentation and of the dashboard are not meant.
 static bool router_redirect_slash(const Router *router, const Request *request, Reply *reply) {
     RouteMatch match;
-    char path[REQUEST_TARGET_MAX + 1];
-    const size_t size = strlen(request->path);
-    if (strcmp(request->method, "GET") != 0 || size < 2 || size >= sizeof path ||
-        request->path[size - 1] != '/' || strncmp(request->path, "/guide/", 7) == 0 || // folders
-        strncmp(request->path, "/web/", 5) == 0)
+    char path[REQUEST_TARGET_MAX + 2];
+    size_t size = strlen(request->path);
+    if (strcmp(request->method, "GET") != 0 || size < 2 || size + 1 >= sizeof path ||
+        strncmp(request->path, "/guide/", 7) == 0 || strncmp(request->path, "/web/", 5) == 0)
         return false;
-    memcpy(path, request->path, size - 1);
-    path[size - 1] = '\0';
+    memcpy(path, request->path, size + 1);
+    if (path[size - 1] == '/')
+        path[--size] = '\0';
+    else
+        memcpy(path + size++, "/", 2);
     const char *query = strchr(request->target, '?');
     query = query != NULL ? query : "";
     if (route_find(router->routes, "GET", path, &match) == NULL ||
-        strlen(path) + strlen(query) >= sizeof reply->location)
+        size + strlen(query) >= sizeof reply->location)
         return false;
-    memcpy(reply->location, path, size - 1);
-    memcpy(reply->location + size - 1, query, strlen(query) + 1);
+    memcpy(reply->location, path, size);
+    memcpy(reply->location + size, query, strlen(query) + 1);
     base_path_apply(reply->location, sizeof reply->location);
     reply_borrow(reply, 308, NULL, NULL, 0);
     return true;

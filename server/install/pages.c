@@ -292,7 +292,7 @@ static const struct {
 } pages[] = {
     {"impactd.1", manual_program},     {"impactd-scene.5", manual_scene},
     {"impactd.bash", completion_bash}, {"commands.md", part_commands},
-    {"scene.md", part_scene},
+    {"scene.md", part_scene},          {"api.md", part_api},
 };
 
 int main(int argc, char **argv) {
