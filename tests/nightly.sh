@@ -12,12 +12,13 @@
 #   storm       a million requests, 10,000 cancels
 #   fuzz        mutated ground motions and material files
 #   browser     the browser tests with slow computers and late answers
+#   package     the Debian package in an empty Debian 12: install, upgrade, remove, purge
 #   bench       the benchmarks
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
 
-all=(commit clang threads sanitized kills truth storm fuzz browser bench)
+all=(commit clang threads sanitized kills truth storm fuzz browser package bench)
 is_quick=
 [ "${1-}" != --quick ] || { is_quick=1 && shift; }
 parts=("${@:-${all[@]}}")
@@ -167,6 +168,12 @@ part_browser() {
         sized test_token.mjs '' "$python" tests/browser/test_browser.py --build build $pace
         [ -z "$is_quick" ] || break
     done
+}
+
+part_package() {
+    build release
+    check server/packages.sh <(printf '%s\n' lintian debootstrap)
+    sized lintian '' "$python" tests/contract/test_package.py --build build
 }
 
 part_bench() {

@@ -43,9 +43,91 @@ file(GLOB INSTALLED_EXAMPLES CONFIGURE_DEPENDS schema/examples/*.json)
 install(FILES ${INSTALLED_SCHEMAS} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/schema)
 install(FILES ${INSTALLED_EXAMPLES} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/examples)
 install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+file(GLOB INSTALLED_GUIDE CONFIGURE_DEPENDS web/guide/*.md web/guide/*.svg web/guide/*.png)
+file(GLOB INSTALLED_CLIENTS CONFIGURE_DEPENDS web/client/*.py web/client/*.m)
+install(FILES ${INSTALLED_GUIDE} DESTINATION ${CMAKE_INSTALL_DOCDIR}/guide)
+install(FILES ${INSTALLED_CLIENTS} DESTINATION ${CMAKE_INSTALL_DATADIR}/impactd/client)
 # The unit has the path of the program in this installation.
 install(CODE "
     get_filename_component(prefix \"\${CMAKE_INSTALL_PREFIX}\" ABSOLUTE)
     set(IMPACTD_BINARY \"\${prefix}/${CMAKE_INSTALL_BINDIR}/impactd\")
     configure_file(\"${PROJECT_SOURCE_DIR}/server/install/impactd.service.in\" \"${PAGES}/impactd.service\" @ONLY)
     file(INSTALL DESTINATION \"\${CMAKE_INSTALL_PREFIX}/lib/systemd/system\" TYPE FILE FILES \"${PAGES}/impactd.service\")")
+
+# cpack -G DEB, in the build folder: impactd_VERSION_ARCH.deb. Its unit has the user impactd instead of a dynamic one, so
+# that commands can be run as that user. Options of `impactd serve` are lines of the configuration file.
+file(WRITE ${PAGES}/deb/default "# Options of `impactd serve`, one to a line; see impactd.service(8). For example:
+#IMPACTD_LISTEN=127.0.0.1:8080
+#IMPACTD_WORKERS=2
+")
+file(WRITE ${PAGES}/deb/conffiles "/etc/default/impactd\n")
+file(WRITE ${PAGES}/deb/overrides "# The project has no mail address: a distributor sets CPACK_PACKAGE_CONTACT.
+impactd: bogus-mail-host *
+impactd: bogus-mail-host-in-debian-changelog *
+")
+file(READ LICENSE licence)
+string(REGEX REPLACE ".*\n\n(Permission)" "\\1" licence "${licence}")
+string(REPLACE "\n" "\n " licence "${licence}")
+string(REPLACE "\n \n" "\n .\n" licence "${licence}")
+file(WRITE ${PAGES}/deb/copyright "Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
+Upstream-Name: impactd
+Comment: The program is linked with FFTW, so it may be passed on under the terms of
+ the GNU General Public License, version 2 or later, in
+ /usr/share/common-licenses/GPL-2. It contains dragonbox (Copyright 2020-2021
+ Junekey Jeon, Boost Software License 1.0).
+
+Files: *
+Copyright: 2026 the impactd authors
+License: Expat
+
+Files: web/vendor/uplot/*
+Copyright: 2022 Leon Sorokin
+License: Expat
+
+License: Expat
+ ${licence}")
+# What Debian wants otherwise than `cmake --install` has it.
+file(WRITE ${PAGES}/deb/prepare.cmake [[
+    set(root ${CPACK_TEMPORARY_INSTALL_DIRECTORY})
+    string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
+    file(WRITE ${root}/usr/share/doc/impactd/changelog "impactd (${CPACK_PACKAGE_VERSION}) unstable; urgency=medium
+
+  * Release ${CPACK_PACKAGE_VERSION}.
+
+ -- ${CPACK_PACKAGE_CONTACT}  ${date}
+")
+    file(REMOVE ${root}/usr/share/doc/impactd/LICENSE)
+    file(READ ${root}/usr/lib/systemd/system/impactd.service unit)
+    string(REPLACE "DynamicUser=yes" "User=impactd" unit "${unit}")
+    file(WRITE ${root}/usr/lib/systemd/system/impactd.service "${unit}")
+    file(GLOB pages ${root}/usr/share/man/man*/*.[1-9] ${root}/usr/share/doc/impactd/changelog)
+    execute_process(COMMAND gzip -9nf ${pages} COMMAND_ERROR_IS_FATAL ANY)
+]])
+foreach(script postinst prerm postrm)
+    configure_file(server/install/maintainer.sh ${PAGES}/deb/${script} COPYONLY)
+    list(APPEND CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PAGES}/deb/${script})
+endforeach()
+list(APPEND CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PAGES}/deb/conffiles)
+install(FILES ${PAGES}/deb/default DESTINATION /etc/default RENAME impactd COMPONENT debian EXCLUDE_FROM_ALL)
+install(FILES ${PAGES}/deb/overrides DESTINATION share/lintian/overrides RENAME impactd COMPONENT debian EXCLUDE_FROM_ALL)
+install(FILES ${PAGES}/deb/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT debian EXCLUDE_FROM_ALL)
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_CONTACT "the impactd authors <impactd@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "simulator of structures with impact dampers")
+set(CPACK_PACKAGE_DESCRIPTION "An impact damper is a free mass that bounces between two stops inside a
+vibrating structure and dissipates its energy. impactd computes the motion,
+all impacts, spectra and the energy balance of a scene in JSON: as a server
+with an HTTP interface and a dashboard, and as a command line.")
+set(CPACK_INSTALL_CMAKE_PROJECTS "${CMAKE_BINARY_DIR};impactd;ALL;/;${CMAKE_BINARY_DIR};impactd;debian;/")
+set(CPACK_SET_DESTDIR ON)
+set(CPACK_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PRE_BUILD_SCRIPTS ${PAGES}/deb/prepare.cmake)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS adduser)
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "curl, python3")
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+include(CPack)

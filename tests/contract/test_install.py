@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
-"""What `cmake --install` puts where: the program, its manual, completions and unit, each used from there."""
+"""What `cmake --install` puts where: the program, its manual, completions and unit, each used from there; and the package."""
 
 import contextlib
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import package  # noqa: E402
 import program  # noqa: E402
+from package import need  # noqa: E402
 
 MANUALS = ("man1/impactd.1", "man5/impactd-scene.5", "man8/impactd.service.8")
 OPTION = re.compile(r"^  (?:-\w, |    )(--[\w-]+)", re.M)
@@ -35,12 +36,6 @@ def commands():
     text = program.run("--help")[1]
     names = re.findall(r"^  ([\w-]+) +\S", text[text.rindex('"sample_rate"'):], re.M)
     return {name: OPTION.findall(program.run("help", name)[1]) for name in names}
-
-
-def need(*tools):
-    for tool in tools:
-        if shutil.which(tool) is None:
-            raise program.Skipped(f"{tool} is not here")
 
 
 def test_everything_is_installed_under_its_prefix():
@@ -132,6 +127,38 @@ def test_the_unit_is_well_formed_and_shut_off():
         done = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=20", here],
                               capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout[-300:] + done.stderr
+
+
+def test_the_debian_package_is_whole():
+    """cpack makes a package with all files compressed and owned as Debian wants, their libraries, a configuration file and scripts."""
+    with tempfile.TemporaryDirectory() as folder, installed("/usr") as root:
+        deb = package.made(folder, "7.8.9")
+        architecture = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
+        assert os.path.basename(deb) == f"impactd_7.8.9_{architecture}.deb"
+        lines = [line.split(maxsplit=5) for line in package.asked(deb, "-c").splitlines()]
+        assert all(line[1] == "root/root" for line in lines)
+        modes = {line[5][2:]: line[0] for line in lines if not line[5].endswith("/")}
+        wanted = {file + (".gz" if "/share/man/" in file else "") for file in listed(root)} - {"usr/share/doc/impactd/LICENSE"}
+        wanted |= {"etc/default/impactd", "usr/share/lintian/overrides/impactd", "usr/share/doc/impactd/copyright",
+                   "usr/share/doc/impactd/changelog.gz"}
+        assert modes.keys() == wanted, modes.keys() ^ wanted
+        assert {name for name, mode in modes.items() if mode != "-rw-r--r--"} == {"usr/bin/impactd"}
+        depends = package.asked(deb, "-f", "Depends").strip()
+        needed = subprocess.run(["ldd", program.impactd()], capture_output=True, text=True, check=True).stdout
+        for library, name in (("libmicrohttpd", "libmicrohttpd12"), ("libsqlite3", "libsqlite3-0"), ("libfftw3", "libfftw3-double3")):
+            assert library in needed and name in depends, (name, depends)
+        assert "adduser" in depends and package.asked(deb, "-f", "Version").strip() == "7.8.9"
+        control = os.path.join(folder, "control")
+        package.asked(deb, "-e", control)
+        assert set(os.listdir(control)) == {"control", "md5sums", "conffiles", "postinst", "prerm", "postrm"}
+        with open(os.path.join(control, "conffiles"), encoding="utf-8") as file:
+            assert file.read() == "/etc/default/impactd\n"
+        package.asked(deb, "-x", os.path.join(folder, "tree"))
+        with open(os.path.join(folder, "tree/usr/lib/systemd/system/impactd.service"), encoding="utf-8") as file:
+            unit = file.read()
+        assert "\nUser=impactd\n" in unit and "DynamicUser" not in unit and "ExecStart=/usr/bin/impactd serve\n" in unit
+        shown = subprocess.run([os.path.join(folder, "tree/usr/bin/impactd"), "--version"], capture_output=True, check=True).stdout
+        assert b"impactd" in shown
 
 
 if __name__ == "__main__":
