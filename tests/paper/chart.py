@@ -108,7 +108,7 @@ def pulses(left, top):
 
 
 def reach(left, top, points):
-    panel = Panel(left, top, "9, 11: where the models part, random base", (0.02, 2), (-1, 27), (True, False))
+    panel = Panel(left, top, "9, 11: where the models differ, random base", (0.02, 2), (-1, 27), (True, False))
     panel.axes((0.02, 0.05, 0.1, 0.2, 0.5, 1, 2), (0, 5, 10, 15, 20, 25),
                ("frequency × contact time", "impulse over spring-damper [dB]"))
     fine = numpy.geomspace(0.02, 2, 160)

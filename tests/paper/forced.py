@@ -72,7 +72,7 @@ def motion(hard, soft):
     near, near_again, far, far_again = (parting(runs[0], other) for runs in (hard, soft) for other in runs[1:])
     return row(
         "8, 10", "time histories match \"reasonably well\" with bare aluminium and differ with the sponge",
-        f"displacements part by {percent(near)} rms (repeated tests {percent(near_again)}) and by {percent(far)} "
+        f"displacements differ by {percent(near)} rms (repeated tests {percent(near_again)}) and by {percent(far)} "
         f"({percent(far_again)})", f"aluminium at most, sponge more than {EDGE} times as far as repeated tests",
         near <= EDGE * near_again and far > EDGE * far_again,
         {"aluminium": [near, near_again], "sponge": [far, far_again]}, firm=False, brief=False,
@@ -96,7 +96,7 @@ def reach(seeds):
     text = ", ".join(f"{corner:.0f} Hz ({plain(name)})" for name, corner in corners.items())
     return row(
         "Section 6", "impulse models are acceptable only where the contact time is \"negligibly small\"",
-        f"the models' spectra part by what the spectrum of an isolated contact lacks, within {worst:.1f} dB: by 3 dB "
+        f"the models' spectra differ by what the spectrum of an isolated contact lacks, within {worst:.1f} dB. They differ by 3 dB "
         f"at {text}",
         "random base, five buffers, thirds of octaves in 16-406 Hz: within 2 dB of the closed form where that is "
         "below 6 dB",

@@ -30,7 +30,7 @@ def first_impact():
     known = measure.first_touch(M, K, C, RELEASE, CLEARANCE)
     found = [run.impacts[0]["start"] for run in both("sponge")]
     worst = max(abs(one - known) for one in found)
-    return [row("4-7", "(not told: when the ball first touches)",
+    return [row("4-7", "(does not state when the ball first touches)",
                 f"{found[0]:.14f} s by both models, {known:.14f} s by pen and paper", "within 1e-13 s", worst < 1e-13,
                 {"start": found[0]}, brief=False)]
 
@@ -52,7 +52,7 @@ def hard_motion():
             many > len(pushes) / 2 and late < pushes.max() / 10 and smooth <= K * RELEASE / M * (1 + 1e-9),
             {"above": many, "contacts": len(pushes), "largest": float(pushes.max()), "late": late, "impulse": smooth}),
         row("4", "both models match the experiment \"well\" but for the peaks",
-            f"their displacements part by {percent(apart, 1)} rms; third impact at {pair(third, 5)} s",
+            f"their displacements differ by {percent(apart, 1)} rms; third impact at {pair(third, 5)} s",
             "below 5 % rms", apart < 0.05, {"rms": apart, "third": third})]
 
 
@@ -65,7 +65,7 @@ def soft_motion():
     pushes, lengths = run.each("peak_force") / M, run.each("duration")
     return [
         row("6", "with the sponge the impulse model \"does not match the experimental result well\"",
-            f"displacements part by {percent(apart)} rms; third impact at {pair(third, 3)} s; "
+            f"displacements differ by {percent(apart)} rms; third impact at {pair(third, 3)} s; "
             f"{pair(counts, 0)} impacts",
             f"more than {FAR} times as far as aluminium's", apart > FAR * hard,
             {"rms": apart, "third": third, "impacts": counts}),

@@ -38,16 +38,16 @@ def all_rows(seeds):
 
 def table(rows, choices):
     """All of it as text."""
-    lines = ["The paper, reproduced (tests/paper/reproduce.py). Its experiments are not in its text: what can be told is",
-             "whether its two models agree where it says that both match one. A repeated test is one model twice, the",
-             "second time started slightly otherwise. Rows marked * hold motions that amplify rounding.", ""]
+    lines = ["The paper, reproduced (tests/paper/reproduce.py). The paper does not print its experiments: the",
+             "comparison is between its two models where it says that both match an experiment. A repeated test is one model",
+             "run twice with slightly different initial values. Rows marked * are of motions that amplify rounding.", ""]
     for row in rows:
         name = row["figure"] if row["figure"][0].isalpha() else "Figure " + row["figure"]
         lines += [f"{name}{'' if row['firm'] else ' *'}: {VERDICT[row['holds']]}",
                   f"  the paper   {row['says']}", f"  we get      {row['finds']}", f"  criterion   {row['criterion']}"]
         lines += [f"  note        {row['why']}"] if row["why"] else []
         lines.append("")
-    lines += ["What the paper leaves open, what is taken, and how far the models are apart with another choice",
+    lines += ["Choices that the paper leaves open, the one taken, and how far the models are apart with another",
               "(thirds of octaves, 1-16 / 16-128 Hz; free vibration where no base is named)", ""]
     for entry in choices:
         lines.append(f"{entry['about']}: {entry['taken']}")
