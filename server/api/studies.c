@@ -158,7 +158,9 @@ static Status sweep_reply_table(App *app, Reply *reply, const TableFormat *forma
 static Status sweep_reply_chart(App *app, Reply *reply, const TableFormat *format, SweepReply *sent,
                                 Problem *problem) {
     Bytes bytes = {.most = app->reply_most};
-    const bool is_whole = chart_sweep(&sent->document, &bytes);
+    Chart chart;
+    const bool is_whole = chart_sweep(&sent->document, &chart);
+    chart_write(&chart, &bytes);
     sweep_reply_free(sent);
     if (is_whole)
         return reply_bytes(reply, 200, format->content_type, &bytes, problem);

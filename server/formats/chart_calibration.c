@@ -53,26 +53,25 @@ static void calibration_add_motion(Chart *chart, const CalibrationMotion *motion
                                        .colour = 1, .name = "difference"});
 }
 
-void chart_calibration(const Variant *answer, Bytes *bytes) {
+void chart_calibration(const Variant *answer, Chart *chart) {
     const Calibration *calibration = (const Calibration *)(const void *)answer;
-    Chart chart = {.width = 760, .left = 80, .right = 110, .title = "Calibration"};
-    chart.heading = calibration->parameters.count > 0
-                        ? calibration_parameter_text(&chart, &calibration->parameters.at[0])
-                        : NULL;
+    *chart = (Chart){.width = 760, .left = 80, .right = 110, .title = "Calibration"};
+    chart->heading = calibration->parameters.count > 0
+                         ? calibration_parameter_text(chart, &calibration->parameters.at[0])
+                         : NULL;
     if (calibration->parameters.count > 1)
-        chart.heading = chart_text(&chart, "%s, and %zu more", chart.heading,
-                                   calibration->parameters.count - 1);
-    chart_note(&chart, "", calibration->detail);
+        chart->heading = chart_text(chart, "%s, and %zu more", chart->heading,
+                                    calibration->parameters.count - 1);
+    chart_note(chart, "", calibration->detail);
     for (size_t i = 0; i < calibration->parameters.count; i++)
-        chart_note(&chart, " ", calibration_parameter_text(&chart, &calibration->parameters.at[i]));
+        chart_note(chart, " ", calibration_parameter_text(chart, &calibration->parameters.at[i]));
     for (size_t i = 0; i < calibration->motions.count; i++)
         if (i < MOTIONS_DRAWN)
-            calibration_add_motion(&chart, &calibration->motions.at[i]);
+            calibration_add_motion(chart, &calibration->motions.at[i]);
         else
-            chart_note(&chart, " Not drawn: ", calibration->motions.at[i].channel);
+            chart_note(chart, " Not drawn: ", calibration->motions.at[i].channel);
     if (calibration->motions.count == 0) // every run failed
-        chart_panel(&chart, "no fit", 60);
-    chart_write(&chart, bytes);
+        chart_panel(chart, "no fit", 60);
 }
 
 // A row for each parameter.

@@ -108,39 +108,38 @@ static void fragility_add_metric(Chart *chart, const Fragility *answer, int metr
     }
 }
 
-void chart_fragility(const Variant *variant, Bytes *bytes) {
+void chart_fragility(const Variant *variant, Chart *chart) {
     const Fragility *answer = (const Fragility *)(const void *)variant;
-    Chart chart = {.width = 820, .left = 80, .right = 300, .title = "Fragility"};
+    *chart = (Chart){.width = 820, .left = 80, .right = 300, .title = "Fragility"};
     const size_t count = answer->curves.count > 0 ? answer->curves.at[0].points.count : 0;
-    double *levels = chart_new(&chart, count + 1, sizeof *levels);
+    double *levels = chart_new(chart, count + 1, sizeof *levels);
     for (size_t l = 0; l < count && levels != NULL; l++)
         levels[l] = answer->curves.at[0].points.at[l].level;
-    chart.heading = chart_text(&chart, "Fragility of %zu ground motions", answer->curves.count);
-    bytes_format(&chart.description,
+    chart->heading = chart_text(chart, "Fragility of %zu ground motions", answer->curves.count);
+    bytes_format(&chart->description,
                  "Dots: shares of the records; lines: lognormal distributions. Below: medians and "
                  "bands of 16 to 84 %% of the records. %llu of %llu runs failed.",
                  (unsigned long long)answer->made.failed, (unsigned long long)answer->made.runs);
-    ChartPanel *panel = chart_panel(&chart, "probability of exceeding a limit", 240);
+    ChartPanel *panel = chart_panel(chart, "probability of exceeding a limit", 240);
     for (size_t i = 0; i < answer->limits.count && count > 0; i++)
         if (i < LIMITS_DRAWN)
-            fragility_add_limit(&chart, panel, answer, i, levels, count);
+            fragility_add_limit(chart, panel, answer, i, levels, count);
         else
-            chart_note(&chart, " Not drawn: ", fragility_limit_text(&chart, &answer->limits.at[i]));
+            chart_note(chart, " Not drawn: ", fragility_limit_text(chart, &answer->limits.at[i]));
     for (size_t i = 0; i < answer->limits.count && count > 0; i++) {
         size_t first = 0;
         while (answer->limits.at[first].metric != answer->limits.at[i].metric)
             first++;
         const int metric = answer->limits.at[i].metric;
-        if (first == i && chart.count <= METRICS_DRAWN)
-            fragility_add_metric(&chart, answer, metric, levels, count);
+        if (first == i && chart->count <= METRICS_DRAWN)
+            fragility_add_metric(chart, answer, metric, levels, count);
         else if (first == i)
-            chart_note(&chart, " Not drawn: fractiles of ", study_metric_names[metric]);
+            chart_note(chart, " Not drawn: fractiles of ", study_metric_names[metric]);
     }
-    for (size_t i = 0; i < chart.count; i++) {
-        chart.panels[i].x.is_unlabelled = i + 1 < chart.count;
-        chart.panels[i].x.title = fragility_axis(&chart, &answer->intensity);
+    for (size_t i = 0; i < chart->count; i++) {
+        chart->panels[i].x.is_unlabelled = i + 1 < chart->count;
+        chart->panels[i].x.title = fragility_axis(chart, &answer->intensity);
     }
     for (size_t i = 0; i < answer->made.warnings.count; i++)
-        chart_note(&chart, " ", answer->made.warnings.at[i].detail);
-    chart_write(&chart, bytes);
+        chart_note(chart, " ", answer->made.warnings.at[i].detail);
 }

@@ -121,25 +121,24 @@ static void optimum_add_front(Chart *chart, const Optimum *optimum) {
     optimum_add_markers(chart, panel, rows, all_x, all_y, false);
 }
 
-void chart_optimum(const Variant *answer, Bytes *bytes) {
+void chart_optimum(const Variant *answer, Chart *chart) {
     const Optimum *optimum = (const Optimum *)(const void *)answer;
-    Chart chart = {.width = 720, .left = 84, .right = 130, .title = "Optimisation"};
-    bytes_format(&chart.description, "%llu candidates, %llu runs, of which %llu failed.",
+    *chart = (Chart){.width = 720, .left = 84, .right = 130, .title = "Optimisation"};
+    bytes_format(&chart->description, "%llu candidates, %llu runs, of which %llu failed.",
                  (unsigned long long)optimum->candidates, (unsigned long long)optimum->made.runs,
                  (unsigned long long)optimum->made.failed);
     for (size_t i = 0; i < optimum->best.objectives.count; i++) {
         const OptimumObjective *objective = &optimum->best.objectives.at[i];
         chart_note(
-            &chart, " Best: ",
-            chart_text(&chart, "%s %.4g", study_metric_names[objective->metric], objective->value));
+            chart, " Best: ",
+            chart_text(chart, "%s %.4g", study_metric_names[objective->metric], objective->value));
     }
     for (size_t i = 0; i < optimum->made.warnings.count; i++)
-        chart_note(&chart, " ", optimum->made.warnings.at[i].detail);
+        chart_note(chart, " ", optimum->made.warnings.at[i].detail);
     if (optimum->objectives.count == 2)
-        optimum_add_front(&chart, optimum);
+        optimum_add_front(chart, optimum);
     else if (optimum->objectives.count == 1)
-        optimum_add_history(&chart, optimum);
-    chart_write(&chart, bytes);
+        optimum_add_history(chart, optimum);
 }
 
 // A row for each candidate.

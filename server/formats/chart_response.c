@@ -131,7 +131,7 @@ void response_table(const Variant *answer, StudyTable *table) {
     }
 }
 
-void chart_response(const Variant *answer, Bytes *bytes) {
+void chart_response(const Variant *answer, Chart *chart) {
     static const struct {
         int direction;
         const char *stable, *unstable;
@@ -139,27 +139,26 @@ void chart_response(const Variant *answer, Bytes *bytes) {
                       {CURVE_DOWN, "stable, down", "unstable, down"},
                       {CHOICE_ABSENT, "stable, continued", "unstable, continued"}};
     const ResponseCurve *curve = (const ResponseCurve *)(const void *)answer;
-    Chart chart = {.width = 720, .left = 90, .right = 180, .title = "Response curve"};
+    *chart = (Chart){.width = 720, .left = 90, .right = 180, .title = "Response curve"};
     const char *axis = chart_quantity(
-        &chart, curve->member.pointer != NULL ? curve->member.pointer : "value", curve->unit);
-    ChartPanel *panel = chart_panel(&chart, "peak displacement of the steady motion [m]", 320);
+        chart, curve->member.pointer != NULL ? curve->member.pointer : "value", curve->unit);
+    ChartPanel *panel = chart_panel(chart, "peak displacement of the steady motion [m]", 320);
     panel->x.title = axis;
     for (size_t i = 0; i < COUNT(directions); i++) {
-        response_add_orbits(&chart, panel, &curve->points, directions[i].direction, true,
+        response_add_orbits(chart, panel, &curve->points, directions[i].direction, true,
                             (ChartSeries){.colour = i, .legend = directions[i].stable});
         response_add_orbits(
-            &chart, panel, &curve->points, directions[i].direction, false,
+            chart, panel, &curve->points, directions[i].direction, false,
             (ChartSeries){.colour = i, .look = "wanted", .legend = directions[i].unstable});
     }
-    response_add_points(&chart, panel, &curve->points, true,
+    response_add_points(chart, panel, &curve->points, true,
                         (ChartSeries){.colour = 0, .legend = "a branch of one point"});
-    response_add_points(&chart, panel, &curve->points, false,
+    response_add_points(chart, panel, &curve->points, false,
                         (ChartSeries){.colour = 3, .legend = "no period found"});
-    response_add_undamped(&chart, panel, &curve->points);
-    response_add_sections(&chart, curve, axis);
-    chart_note(&chart, " ",
-               chart_text(&chart, "%llu points, of which %llu failed",
+    response_add_undamped(chart, panel, &curve->points);
+    response_add_sections(chart, curve, axis);
+    chart_note(chart, " ",
+               chart_text(chart, "%llu points, of which %llu failed",
                           (unsigned long long)curve->made.runs,
                           (unsigned long long)curve->made.failed));
-    chart_write(&chart, bytes);
 }

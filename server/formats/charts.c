@@ -176,19 +176,18 @@ static void tradeoff_fill(Chart *chart, ChartPanel *panel, const Tradeoff *trade
                                            .look = "ring", .legend = "to take"});
 }
 
-void chart_tradeoff(const Variant *answer, Bytes *bytes) {
+void chart_tradeoff(const Variant *answer, Chart *chart) {
     const Tradeoff *tradeoff = (const Tradeoff *)(const void *)answer;
-    Chart chart = {.width = 640, .left = 62, .right = 154};
-    const char *metric = charts_words(&chart, metric_names[tradeoff->metric]);
-    chart.title = chart_text(&chart, "Error of %s against CPU time", metric);
-    chart.heading =
-        chart_text(&chart, "Error of %s%s", metric, tradeoff->metric == METRIC_PSD ? " [dB]" : "");
-    chart_note(&chart, "", tradeoff->recommendation.why);
-    ChartPanel *panel = chart_panel(&chart, NULL, 332);
+    *chart = (Chart){.width = 640, .left = 62, .right = 154};
+    const char *metric = charts_words(chart, metric_names[tradeoff->metric]);
+    chart->title = chart_text(chart, "Error of %s against CPU time", metric);
+    chart->heading =
+        chart_text(chart, "Error of %s%s", metric, tradeoff->metric == METRIC_PSD ? " [dB]" : "");
+    chart_note(chart, "", tradeoff->recommendation.why);
+    ChartPanel *panel = chart_panel(chart, NULL, 332);
     panel->x.is_logarithmic = panel->y.is_logarithmic = true;
     panel->x.title = "CPU time of a run [s]";
-    tradeoff_fill(&chart, panel, tradeoff);
-    chart_write(&chart, bytes);
+    tradeoff_fill(chart, panel, tradeoff);
 }
 
 // --- ensemble ---
@@ -304,33 +303,32 @@ static void ensemble_add_indices(Chart *chart, const Ensemble *ensemble) {
     }
 }
 
-void chart_ensemble(const Variant *answer, Bytes *bytes) {
+void chart_ensemble(const Variant *answer, Chart *chart) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
-    Chart chart = {.width = 640, .left = 160, .right = 14};
+    *chart = (Chart){.width = 640, .left = 160, .right = 14};
     const bool has_inputs = ensemble->inputs.count > 0;
     unsigned long long runs = 0;
     for (size_t i = 0; i < ensemble->table.count; i++)
         runs += ensemble->table.at[i].why == NULL ? 1 : 0;
-    chart.title = chart_text(&chart, "Mean of %llu runs", runs);
-    chart.heading = has_inputs ? chart_text(&chart, "Median of %llu runs, with 90 %% of them", runs)
-                               : chart_text(&chart, "Mean of %llu runs, with its %g %% interval",
-                                            runs, 100 * ensemble->confidence);
-    bytes_format(&chart.description, "%llu runs, seeds from %llu; %llu failed.",
+    chart->title = chart_text(chart, "Mean of %llu runs", runs);
+    chart->heading = has_inputs ? chart_text(chart, "Median of %llu runs, with 90 %% of them", runs)
+                                : chart_text(chart, "Mean of %llu runs, with its %g %% interval",
+                                             runs, 100 * ensemble->confidence);
+    bytes_format(&chart->description, "%llu runs, seeds from %llu; %llu failed.",
                  (unsigned long long)ensemble->made.runs, (unsigned long long)ensemble->first_seed,
                  (unsigned long long)ensemble->made.failed);
-    chart_note(&chart, " Target: ", ensemble->target.why);
-    bytes_format(&chart.description,
+    chart_note(chart, " Target: ", ensemble->target.why);
+    bytes_format(&chart->description,
                  " %s: %g %% intervals of the mean over all seeds; boxes: half of the runs; grey "
                  "lines: all of them.%s",
                  has_inputs ? "Black lines" : "Bands and black lines", 100 * ensemble->confidence,
                  has_inputs ? " Bands: 90 % of the runs, around their median." : "");
     if (ensemble->spectra.count > 0)
-        charts_add_bands(&chart, chart_spectra(&chart, NULL, 256), &ensemble->frequency,
+        charts_add_bands(chart, chart_spectra(chart, NULL, 256), &ensemble->frequency,
                          &ensemble->spectra);
-    ensemble_add_history(&chart, ensemble);
-    ensemble_add_statistics(&chart, ensemble);
-    ensemble_add_indices(&chart, ensemble);
-    chart_write(&chart, bytes);
+    ensemble_add_history(chart, ensemble);
+    ensemble_add_statistics(chart, ensemble);
+    ensemble_add_indices(chart, ensemble);
 }
 
 // --- compare ---
@@ -346,32 +344,31 @@ static void compare_add_trace(Chart *chart, ChartPanel *panel, const Comparison 
                             time != NULL ? count : 0, colour, .name = entry->name});
 }
 
-void chart_compare(const Variant *answer, Bytes *bytes) {
+void chart_compare(const Variant *answer, Chart *chart) {
     const Comparison *comparison = (const Comparison *)(const void *)answer;
-    Chart chart = {.width = 960, .left = 70, .right = 330, .title = "Contact models compared"};
-    bytes_text(&chart.description, "The first is the reference, the scene as it is.");
+    *chart = (Chart){.width = 960, .left = 70, .right = 330, .title = "Contact models compared"};
+    bytes_text(&chart->description, "The first is the reference, the scene as it is.");
     ChartPanel *spectra =
-        chart_spectra(&chart, chart_quantity(&chart, comparison->channel, comparison->unit), 286);
-    ChartPanel *traces = chart_panel(&chart, "displacement [m]", 240);
+        chart_spectra(chart, chart_quantity(chart, comparison->channel, comparison->unit), 286);
+    ChartPanel *traces = chart_panel(chart, "displacement [m]", 240);
     traces->x.title = "time [s]";
     size_t drawn = 0;
     for (size_t i = 0; i < comparison->entries.count; i++) {
         const CompareEntry *entry = &comparison->entries.at[i];
         if (entry->status != COMPARE_RUN || drawn == VARIANTS_DRAWN) {
-            charts_add_undrawn(&chart, entry->name, entry->why);
+            charts_add_undrawn(chart, entry->name, entry->why);
             continue;
         }
         const bool has_level = drawn > 0 && !isnan(entry->psd.level);
         const char *legend =
-            has_level ? chart_text(&chart, "%s: %.2g dB off", entry->name, entry->psd.level)
+            has_level ? chart_text(chart, "%s: %.2g dB off", entry->name, entry->psd.level)
                       : entry->name;
         chart_add(spectra,
                   (ChartSeries){CHART_LINE, comparison->frequency.at, entry->density.at, NULL,
                                 charts_shorter(&comparison->frequency, &entry->density), drawn,
                                 .name = entry->name, .legend = legend});
-        compare_add_trace(&chart, traces, comparison, entry, drawn++);
+        compare_add_trace(chart, traces, comparison, entry, drawn++);
     }
-    chart_write(&chart, bytes);
 }
 
 // --- sensitivity ---
@@ -397,29 +394,28 @@ static void sensitivity_add_slopes(Chart *chart, ChartPanel *panel, const Sensit
                                    CHART_CROSS, .names = names});
 }
 
-void chart_sensitivity(const Variant *answer, Bytes *bytes) {
+void chart_sensitivity(const Variant *answer, Chart *chart) {
     const Sensitivity *sensitivity = (const Sensitivity *)(const void *)answer;
     const size_t count = sensitivity->response.count;
-    Chart chart = {.width = 760, .left = 136, .right = 14, .title = "Sensitivity"};
-    bytes_format(&chart.description,
+    *chart = (Chart){.width = 760, .left = 136, .right = 14, .title = "Sensitivity"};
+    bytes_format(&chart->description,
                  "Relative change of each statistic over the relative change of each parameter; "
                  "crosses at the edge do not settle. Bands: 5 to 95 %% of %llu drawn runs.",
                  (unsigned long long)(sensitivity->made - sensitivity->failed));
-    chart_note(&chart, " ", sensitivity->why);
+    chart_note(chart, " ", sensitivity->why);
     if (sensitivity->spectra.count > 0)
-        charts_add_bands(&chart,
-                         chart_spectra(&chart, "Spectra, with 5 to 95 % of the drawn runs", 286),
+        charts_add_bands(chart,
+                         chart_spectra(chart, "Spectra, with 5 to 95 % of the drawn runs", 286),
                          &sensitivity->frequency, &sensitivity->spectra);
     ChartPanel *panel =
-        chart_panel(&chart, "Relative change of the statistic over that of the parameter", 300);
-    charts_add_rows(&chart, panel, STATISTICS_USUAL);
+        chart_panel(chart, "Relative change of the statistic over that of the parameter", 300);
+    charts_add_rows(chart, panel, STATISTICS_USUAL);
     for (size_t i = 0; i < count; i++)
-        sensitivity_add_slopes(&chart, panel, &sensitivity->response.at[i], i,
+        sensitivity_add_slopes(chart, panel, &sensitivity->response.at[i], i,
                                0.6 * (0.5 - ((double)i + 0.5) / (double)count));
-    const double *zero = charts_pair(&chart, 0, 0);
+    const double *zero = charts_pair(chart, 0, 0);
     chart_add(panel,
               (ChartSeries){CHART_LINE, zero, charts_edges, .count = 2, .colour = CHART_STRONG});
-    chart_write(&chart, bytes);
 }
 
 // --- sweep ---
@@ -571,7 +567,7 @@ static void sweep_add_panels(Chart *chart, const Sweep *sweep, const SweepCells 
                                     chart_quantity(chart, cells->y->pointer, cells->y->unit));
 }
 
-bool chart_sweep(const SweepDocument *source, Bytes *bytes) {
+bool chart_sweep(const SweepDocument *source, Chart *chart) {
     const Sweep *sweep = source->sweep;
     const bool is_map = sweep->axes.count > 1 && sweep->mode == SWEEP_GRID;
     const size_t metrics =
@@ -587,16 +583,15 @@ bool chart_sweep(const SweepDocument *source, Bytes *bytes) {
         cells.rows = (cells.y->values.count + cells.y_group - 1) / cells.y_group;
         cells.points *= cells.y->values.count;
     }
-    Chart chart = {.width = 640, .left = is_map ? 128 : 88, .right = is_map ? 100 : 18};
+    *chart = (Chart){.width = 640, .left = is_map ? 128 : 88, .right = is_map ? 100 : 18};
     const size_t count = cells.columns * cells.rows;
-    cells.low = chart_new(&chart, count * metrics, sizeof *cells.low);
-    cells.high = chart_new(&chart, count * metrics, sizeof *cells.high);
-    double *x = chart_new(&chart, count, sizeof *x);
-    const bool is_read = chart.is_failed || sweep_cells_read(&cells, source, metrics);
-    sweep_add_notes(&chart, source, metrics, is_map);
-    if (!chart.is_failed)
-        sweep_add_panels(&chart, sweep, &cells, metrics, x);
-    chart_write(&chart, bytes);
+    cells.low = chart_new(chart, count * metrics, sizeof *cells.low);
+    cells.high = chart_new(chart, count * metrics, sizeof *cells.high);
+    double *x = chart_new(chart, count, sizeof *x);
+    const bool is_read = chart->is_failed || sweep_cells_read(&cells, source, metrics);
+    sweep_add_notes(chart, source, metrics, is_map);
+    if (!chart->is_failed)
+        sweep_add_panels(chart, sweep, &cells, metrics, x);
     return is_read;
 }
 
@@ -815,16 +810,21 @@ static void svg_add_spectra(Chart *chart, const Table *table) {
     }
 }
 
+void chart_table(const Table *table, Chart *chart) {
+    const bool is_spectra = table->axis_name != NULL && strcmp(table->axis_name, "frequency") == 0;
+    *chart = (Chart){.width = 960, .left = 70, .right = 14};
+    chart->title = is_spectra ? "Power spectral densities" : "Time series";
+    if (is_spectra)
+        svg_add_spectra(chart, table);
+    else
+        svg_add_series(chart, table);
+}
+
 // In one piece: its size is limited.
 static bool svg_next(const Table *table, TextPlace *place, Bytes *bytes) {
-    Chart chart = {.width = 960, .left = 70, .right = 14};
-    const bool is_spectra = table->axis_name != NULL && strcmp(table->axis_name, "frequency") == 0;
+    Chart chart;
     (void)place;
-    chart.title = is_spectra ? "Power spectral densities" : "Time series";
-    if (is_spectra)
-        svg_add_spectra(&chart, table);
-    else
-        svg_add_series(&chart, table);
+    chart_table(table, &chart);
     chart_write(&chart, bytes);
     return false;
 }

@@ -123,10 +123,10 @@ static void fragility_table(const Variant *variant, StudyTable *table) {
     }
 }
 
-static void sweep_chart(const Variant *answer, Bytes *bytes) {
+static void sweep_chart(const Variant *answer, Chart *chart) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
     const SweepDocument document = sweep_document(sweep);
-    (void)chart_sweep(&document, bytes);
+    (void)chart_sweep(&document, chart);
 }
 
 static const TableFormat *const json_only[] = {&format_json, NULL};
@@ -138,7 +138,7 @@ typedef struct AnswerFormats {
     const StudyKind *study;
     const TableFormat *const *formats;
     void (*table)(const Variant *answer, StudyTable *table); // NULL: none, or one of its own
-    void (*chart)(const Variant *answer, Bytes *bytes);
+    void (*chart)(const Variant *answer, Chart *chart);
 } AnswerFormats;
 
 static const AnswerFormats all[] = {
@@ -173,6 +173,10 @@ const TableFormat *study_format_find(const Kind *kind, const char *extension) {
     return *formats;
 }
 
+void study_chart(const Variant *answer, Chart *chart) {
+    answer_formats(answer->kind)->chart(answer, chart);
+}
+
 static void study_format_table(const TableFormat *format, const Table *table, Bytes *bytes) {
     if (format_write(format, table, bytes, NULL) != STATUS_OK)
         bytes->is_failed = true;
@@ -182,7 +186,9 @@ void study_format_write(const TableFormat *format, const StudyDocument *document
     const Variant *answer = document->answer;
     const AnswerFormats *own = answer_formats(answer->kind);
     if (format == &format_svg) {
-        own->chart(answer, bytes);
+        Chart chart;
+        own->chart(answer, &chart);
+        chart_write(&chart, bytes);
     } else if (answer->kind == study_sweep.answer) {
         SweepDocument sweep = sweep_document((const Sweep *)(const void *)answer);
         const Table table = sweep_document_table(&sweep);

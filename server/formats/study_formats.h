@@ -5,6 +5,7 @@
 #include "core/drop_test/evaluation.h"
 #include "core/study/study.h"
 #include "core/study/sweep.h"
+#include "server/formats/chart.h"
 #include "server/formats/format.h"
 #include "server/jobs/documents.h"
 
@@ -14,6 +15,9 @@ const TableFormat *const *study_formats(const Kind *kind);
 const TableFormat *study_format_find(const Kind *kind, const char *extension);
 // Appends the whole document.
 void study_format_write(const TableFormat *format, const StudyDocument *document, Bytes *bytes);
+
+// Describes the chart of an answer whose formats include svg, into a new `chart`.
+void study_chart(const Variant *answer, Chart *chart);
 
 // "json, svg", each behind `before`.
 void study_formats_names(const TableFormat *const *formats, const char *before, char *target,
@@ -74,31 +78,33 @@ SweepDocument sweep_document(const Sweep *sweep); // of the answer's own rows
 // axis's values, of a status SweepStatus.
 Table sweep_document_table(SweepDocument *document);
 
-// --- charts: SVG documents, appended; what a chart does not show is named in its description ---
+// --- charts: new descriptions, which name what they do not show ---
 
+// Series over time, or spectra over frequency.
+void chart_table(const Table *table, Chart *chart);
 // Error against CPU time, both logarithmic (a work-precision chart).
-void chart_tradeoff(const Variant *answer, Bytes *bytes);
+void chart_tradeoff(const Variant *answer, Chart *chart);
 // The mean spectra with the intervals of the means, and the statistics with intervals and spread.
-void chart_ensemble(const Variant *answer, Bytes *bytes);
+void chart_ensemble(const Variant *answer, Chart *chart);
 // The spectra and the displacements of all variants.
-void chart_compare(const Variant *answer, Bytes *bytes);
+void chart_compare(const Variant *answer, Chart *chart);
 // A row for each point; see core/study/response_curve.h.
 void response_table(const Variant *answer, StudyTable *table);
 // Amplitudes over the axis with and without dampers, unstable ones dashed, and the sections.
-void chart_response(const Variant *answer, Bytes *bytes);
+void chart_response(const Variant *answer, Chart *chart);
 // The spectra of the drawn runs, and a table of the slopes.
-void chart_sensitivity(const Variant *answer, Bytes *bytes);
+void chart_sensitivity(const Variant *answer, Chart *chart);
 // The probability of exceeding each limit over the intensity, and the fractiles of the metrics.
-void chart_fragility(const Variant *answer, Bytes *bytes);
+void chart_fragility(const Variant *answer, Chart *chart);
 // Measured and fitted motions and their difference; and a row for each parameter.
-void chart_calibration(const Variant *answer, Bytes *bytes);
+void chart_calibration(const Variant *answer, Chart *chart);
 void calibration_table(const Variant *answer, StudyTable *table);
 // The candidates with the best so far, or of two objectives with the front.
-void chart_optimum(const Variant *answer, Bytes *bytes);
+void chart_optimum(const Variant *answer, Chart *chart);
 void optimum_table(const Variant *answer, StudyTable *table);
 // Each metric of a sweep: a line over one axis, or a map over two. Size and memory are limited for
 // any number of points. False: the rows could not be read to their end.
-bool chart_sweep(const SweepDocument *document, Bytes *bytes);
+bool chart_sweep(const SweepDocument *document, Chart *chart);
 // Every reading over approach speed; those without a speed are at the left edge.
 void chart_evaluation(const Evaluation *evaluation, const char *slug, Bytes *bytes);
 // The response spectrum of a ground motion: the first column is the period, the last the

@@ -26,7 +26,9 @@ static char *draw(TradeoffPoint *points, size_t count, double error, uint64_t ch
                                .points = {points, count},
                                .recommendation = {choice, "because a < b & c"}};
     Bytes bytes = {0};
-    chart_tradeoff((const Variant *)(const void *)&tradeoff, &bytes);
+    Chart chart;
+    chart_tradeoff((const Variant *)(const void *)&tradeoff, &chart);
+    chart_write(&chart, &bytes);
     char *text = bytes_take(&bytes, NULL);
     assert_non_null(text);
     assert_null(strstr(text, "nan"));

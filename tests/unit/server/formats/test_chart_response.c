@@ -39,7 +39,9 @@ static char *draw(ResponsePoint *points, size_t count) {
     const ResponseCurve curve = {
         .member.pointer = pointer, .unit = unit, .points = {points, count}};
     Bytes bytes = {0};
-    chart_response(&curve.variant, &bytes);
+    Chart chart;
+    chart_response(&curve.variant, &chart);
+    chart_write(&chart, &bytes);
     char *text = bytes_take(&bytes, NULL);
     assert_non_null(text);
     assert_null(strstr(text, "nan"));

@@ -56,7 +56,9 @@ TEST(rows_that_are_there_are_in_the_table_with_their_status) {
 
 static void draw(const Sweep *sweep, Bytes *bytes) {
     const SweepDocument document = sweep_document(sweep);
-    assert_true(chart_sweep(&document, bytes));
+    Chart chart;
+    assert_true(chart_sweep(&document, &chart));
+    chart_write(&chart, bytes);
 }
 
 static size_t count_of(const char *text, const char *what) {
