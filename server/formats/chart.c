@@ -24,7 +24,8 @@ static const char *const chart_dark[CHART_COLOURS] = {"#56b4e9", "#f0944d", "#3a
 static const char *const chart_shapes[] = {[CHART_DOT] =
                                                "M-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0-7 0z",
                                            [CHART_CROSS] = "M-4-4l8 8M4-4l-8 8",
-                                           [CHART_RING] = "M-8 0a8 8 0 1 0 16 0a8 8 0 1 0-16 0z"};
+                                           [CHART_RING] = "M-8 0a8 8 0 1 0 16 0a8 8 0 1 0-16 0z",
+                                           [CHART_TICK] = "M-.75-8h1.5v8h-1.5z"};
 
 enum { TICKS_MAX = 12, DECADES_LABELLED = 8, DECADES_SHOWN = 8, MAP_STEPS = 24, LEGEND_LINE = 20 };
 
@@ -80,7 +81,7 @@ void chart_add(ChartPanel *panel, ChartSeries series) {
 
 // --- text ---
 
-static void chart_escape(Bytes *bytes, const char *text) {
+void chart_escape(Bytes *bytes, const char *text) {
     static const char marks[] = "&<>\"";
     static const char *const entities[] = {"&amp;", "&lt;", "&gt;", "&quot;"};
     for (const char *c = text; *c != '\0'; c++) {
@@ -156,7 +157,7 @@ static void chart_put_style(Bytes *bytes) {
 
 // --- axes ---
 
-static bool axis_shows(const ChartAxis *axis, double value) {
+bool chart_axis_shows(const ChartAxis *axis, double value) {
     return isinf(value) || (!isnan(value) && (!axis->is_logarithmic || value > 0));
 }
 
@@ -169,7 +170,7 @@ static void axis_extend(ChartAxis *axis, double value) {
 }
 
 static void panel_extend(ChartPanel *panel, double x, double y) {
-    if (axis_shows(&panel->x, x) && !isnan(y)) {
+    if (chart_axis_shows(&panel->x, x) && !isnan(y)) {
         axis_extend(&panel->x, x);
         axis_extend(&panel->y, y);
     }
@@ -202,7 +203,7 @@ static bool panel_fit(ChartPanel *panel) {
         axis_extend(&panel->y, panel->y.ticks[i].value);
     for (size_t i = 0; i < panel->count; i++) {
         const ChartSeries *series = &panel->series[i];
-        padding = series->kind == CHART_MARKERS ? 0.03 : padding;
+        padding = series->kind == CHART_MARKERS && series->shape != CHART_TICK ? 0.03 : padding;
         for (size_t k = 0; k < series->count; k++) {
             if (series->kind == CHART_MAP) {
                 panel_extend(panel, (double)(k % series->columns), (double)(k / series->columns));
@@ -225,17 +226,17 @@ static bool panel_fit(ChartPanel *panel) {
 }
 
 // 0 to 1; values outside, infinite ones and the 0 of a logarithmic axis are at an end.
-static double axis_share(const ChartAxis *axis, double value) {
+double chart_axis_share(const ChartAxis *axis, double value) {
     const double at = axis->is_logarithmic ? log10(value) : value;
     return fmin(fmax((at - axis->min) / (axis->max - axis->min), 0), 1);
 }
 
 static double panel_x(const ChartPanel *panel, double x) {
-    return panel->left + (panel->right - panel->left) * axis_share(&panel->x, x);
+    return panel->left + (panel->right - panel->left) * chart_axis_share(&panel->x, x);
 }
 
 static double panel_y(const ChartPanel *panel, double y) {
-    return panel->bottom - (panel->bottom - panel->top) * axis_share(&panel->y, y);
+    return panel->bottom - (panel->bottom - panel->top) * chart_axis_share(&panel->y, y);
 }
 
 // A grid line and its label: `text`, or 10 to the power of `decade` where it is ""; NULL: none.
@@ -284,11 +285,15 @@ static void panel_put_decades(const ChartPanel *panel, bool is_x, Bytes *bytes) 
 }
 
 // Steps of 1, 2 or 5 times a power of ten.
+double chart_axis_step(const ChartAxis *axis, double parts) {
+    const double part = (axis->max - axis->min) / parts;
+    const double power = pow(10, floor(log10(part))), rest = part / power;
+    return power * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
+}
+
 static void panel_put_steps(const ChartPanel *panel, bool is_x, Bytes *bytes) {
     const ChartAxis *axis = is_x ? &panel->x : &panel->y;
-    const double part = (axis->max - axis->min) / (!is_x && panel->height < 120 ? 2 : 4);
-    const double power = pow(10, floor(log10(part))), rest = part / power;
-    const double step = power * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
+    const double step = chart_axis_step(axis, !is_x && panel->height < 120 ? 2 : 4);
     const double first = ceil(axis->min / step - 1e-9);
     char text[CHART_LABEL];
     for (int i = 0; i < TICKS_MAX && (first + i) * step <= axis->max + 1e-9 * step; i++) {
@@ -350,7 +355,7 @@ static void series_put_points(const ChartPanel *panel, const ChartSeries *series
 }
 
 static bool series_has(const ChartPanel *panel, const ChartSeries *series, size_t i) {
-    return axis_shows(&panel->x, series->x[i]) && !isnan(series->y[i]);
+    return chart_axis_shows(&panel->x, series->x[i]) && !isnan(series->y[i]);
 }
 
 // Lines and bands: from gap to gap along `y`, and back along `high` where there is one.
@@ -503,7 +508,7 @@ static double chart_place(Chart *chart) {
 }
 
 // Panels with one labelled axis have the same range of it.
-static void chart_fit(Chart *chart) {
+void chart_fit(Chart *chart) {
     ChartPanel *panels = chart->panels;
     for (size_t i = 0; i < chart->count; i++) {
         panels[i].has_values = panel_fit(&panels[i]);
@@ -519,7 +524,7 @@ static void chart_fit(Chart *chart) {
         }
 }
 
-static void chart_clear(Chart *chart) {
+void chart_clear(Chart *chart) {
     for (struct ChartBlock *block = chart->blocks, *next; block != NULL; block = next) {
         next = block->next;
         free(block);

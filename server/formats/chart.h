@@ -42,7 +42,7 @@ typedef enum ChartKind {
     CHART_MAP,     // a cell for each value of `y`, row by row from the bottom
 } ChartKind;
 
-typedef enum ChartShape { CHART_DOT, CHART_CROSS, CHART_RING } ChartShape;
+typedef enum ChartShape { CHART_DOT, CHART_CROSS, CHART_RING, CHART_TICK } ChartShape;
 
 typedef struct ChartSeries {
     ChartKind kind;
@@ -83,7 +83,8 @@ typedef struct Chart {
     bool is_failed;            // no memory
 } Chart;
 
-// Zeroed memory that is freed by chart_write. NULL without memory; the document fails then.
+// Zeroed memory that is freed by chart_write and chart_clear. NULL without memory; the document
+// fails then.
 void *chart_new(Chart *chart, size_t count, size_t size);
 // A text in such memory, of CHART_TEXT at most: a longer one ends with "..."; "" without memory.
 const char *chart_text(Chart *chart, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -97,7 +98,27 @@ ChartPanel *chart_spectra(Chart *chart, const char *heading, double height);
 void chart_add(ChartPanel *panel, ChartSeries series);
 // Appends "BEFORE TEXT." to the description, TEXT escaped; nothing where `text` is NULL.
 void chart_note(Chart *chart, const char *before, const char *text);
+// Appends a text escaped for HTML and SVG.
+void chart_escape(Bytes *bytes, const char *text);
 // Appends the document and clears the chart.
 void chart_write(Chart *chart, Bytes *bytes);
+void chart_clear(Chart *chart);
+
+// How a panel is written as text, of at most `columns` characters a line.
+typedef struct ChartText {
+    size_t columns, rows; // rows: of the frame
+    bool is_utf8;         // Braille patterns and box drawing, else ASCII
+    bool has_colour;      // escape sequences of a terminal
+} ChartText;
+
+// Appends one panel, with its heading, labels and legend; the chart remains.
+void chart_write_text(Chart *chart, size_t panel, const ChartText *form, Bytes *bytes);
+
+// Of chart.c, for other renderings: sets ranges, the place of a value from 0 to 1, and steps of
+// round numbers for at least so many labels.
+void chart_fit(Chart *chart);
+double chart_axis_share(const ChartAxis *axis, double value);
+double chart_axis_step(const ChartAxis *axis, double parts);
+bool chart_axis_shows(const ChartAxis *axis, double value);
 
 #endif

@@ -116,8 +116,7 @@ bool reply_is_known(Reply *reply, const Request *request) {
     return true;
 }
 
-// Two spaces for each level; a list of plain values stays on one line.
-static void reply_indent_json(Bytes *bytes, const char *text, size_t size) {
+void reply_indent_json(Bytes *bytes, const char *text, size_t size) {
     static const char blanks[] = " \n\r\t";
     size_t depth = 0;
     bool is_flat = false; // within a list that stays on one line

@@ -38,6 +38,8 @@ bool reply_is_known(Reply *reply, const Request *request);
 
 // Indents JSON that is whole in memory where the request asks for it.
 void reply_indent(Reply *reply, const Request *request);
+// Appends JSON with two spaces for each level; lists of plain values stay on one line.
+void reply_indent_json(Bytes *bytes, const char *text, size_t size);
 
 // Compresses a text that is whole in memory where the client accepts gzip and it becomes smaller.
 bool reply_pack(Reply *reply, const Request *request);

@@ -11,6 +11,7 @@
 
 enum { WIDTH_MAX = 40, ROWS_MAX = 2000, BLOCKS_MAX = 200, VALUES_SHOWN = 24, DEPTH_MAX = 6 };
 enum { CELL_BYTES = 1 << 16, OBJECT_BYTES = 160, HEADING_SIZE = 256 };
+enum { CELL_SHOWN = 4096, NARROW_MIN = 12 };
 
 void text_make_printable(char *text) {
     for (unsigned char *c = (unsigned char *)text; c != NULL && *c != '\0'; c++)
@@ -21,17 +22,7 @@ void text_make_printable(char *text) {
         }
 }
 
-// A table is filled cell by cell; with heads the first row has the names of the columns. Columns of
-// numbers are right-aligned.
-typedef struct PrintTable {
-    size_t columns, count; // count of cells
-    char **cells;
-    bool has_heads, is_failed; // is_failed: no memory
-} PrintTable;
-
-// Adds the next cell. Control characters, which a terminal would interpret, become '?'.
-static void __attribute__((format(printf, 2, 3)))
-print_table_add(PrintTable *table, const char *format, ...) {
+void print_table_add(PrintTable *table, const char *format, ...) {
     va_list arguments, again;
     va_start(arguments, format);
     va_copy(again, arguments);
@@ -52,29 +43,20 @@ print_table_add(PrintTable *table, const char *format, ...) {
     table->cells[table->count++] = text;
 }
 
-static void print_table_clear(PrintTable *table) {
+void print_table_clear(PrintTable *table) {
     for (size_t i = 0; i < table->count; i++)
         free(table->cells[i]);
     free(table->cells);
     *table = (PrintTable){.columns = table->columns};
 }
 
-// The number of UTF-8 characters; on a terminal most of them take one column.
-static int text_width(const char *text) {
-    int width = 0;
-    for (; *text != '\0'; text++)
-        width += ((unsigned char)*text & 0xC0) != 0x80;
-    return width;
-}
-
-static const char *print_table_cell(const PrintTable *table, size_t index) {
+const char *print_table_cell(const PrintTable *table, size_t index) {
     const bool is_unknown =
         table->cells[index][0] == '\0' && table->has_heads && index >= table->columns;
     return is_unknown ? "-" : table->cells[index];
 }
 
-// Whether a column has heads and, below, nothing but numbers.
-static bool print_table_is_numeric(const PrintTable *table, size_t column) {
+bool print_table_is_numeric(const PrintTable *table, size_t column) {
     bool is_numeric = table->has_heads;
     for (size_t i = table->columns + column; i < table->count && is_numeric; i += table->columns) {
         const char *cell = print_table_cell(table, i);
@@ -85,30 +67,62 @@ static bool print_table_is_numeric(const PrintTable *table, size_t column) {
     return is_numeric;
 }
 
-// Prints and clears the table; an empty cell under a head is "-".
-static void print_table_print(PrintTable *table, FILE *file) {
-    int widths[LISTING_COLUMNS] = {0};
+// Makes columns narrower, the widest texts first, until they fit; returns how many of them do.
+static size_t print_table_narrow(const PrintTable *table, size_t max, size_t *widths) {
+    size_t columns = table->columns;
+    while (max > 0 && columns > 1) {
+        size_t total = 2 * (columns - 1), widest = 0, width = NARROW_MIN;
+        for (size_t k = 0; k < columns; k++) {
+            total += widths[k];
+            if (widths[k] > width && !print_table_is_numeric(table, k)) {
+                widest = k;
+                width = widths[k];
+            }
+        }
+        if (total <= max)
+            break;
+        if (width > NARROW_MIN)
+            widths[widest] -= total - max < width - NARROW_MIN ? total - max : width - NARROW_MIN;
+        else
+            columns--;
+    }
+    return columns;
+}
+
+void print_table_print(const PrintTable *table, const PrintTableForm *form, FILE *file) {
+    size_t widths[LISTING_COLUMNS] = {0};
     bool is_numeric[LISTING_COLUMNS];
-    const size_t columns = table->columns;
-    for (size_t k = 0; k < columns; k++) {
+    const size_t all = table->columns, heads = table->has_heads ? all : 0;
+    const size_t shown = form->rows > 0 && table->count > heads + form->rows * all
+                             ? heads + form->rows * all
+                             : table->count;
+    for (size_t k = 0; k < all; k++) {
         is_numeric[k] = print_table_is_numeric(table, k);
-        for (size_t i = k; i < table->count; i += columns) {
-            // A wider cell shifts its own row alone.
-            const int width = text_width(print_table_cell(table, i));
-            widths[k] = width > widths[k] && width <= WIDTH_MAX ? width : widths[k];
+        for (size_t i = k; i < shown; i += all) {
+            // Without a limit a wider cell shifts its own row alone.
+            const size_t width = text_width(print_table_cell(table, i));
+            if (width > widths[k] && (width <= WIDTH_MAX || form->width > 0))
+                widths[k] = width;
         }
     }
-    for (size_t i = 0; i < table->count; i++) {
-        const char *cell = print_table_cell(table, i);
-        const size_t k = i % columns;
-        const int pad = widths[k] > text_width(cell) ? widths[k] - text_width(cell) : 0;
+    const size_t columns = print_table_narrow(table, form->width, widths);
+    for (size_t i = 0; i < shown; i++) {
+        char cell[CELL_SHOWN];
+        const size_t k = i % all;
+        if (k >= columns)
+            continue;
+        text_fit(cell, form->width > 0 && widths[k] + 1 < sizeof cell ? widths[k] + 1 : sizeof cell,
+                 print_table_cell(table, i));
+        const size_t width = text_width(cell), pad = widths[k] > width ? widths[k] - width : 0;
         const bool is_last = k + 1 == columns || i + 1 == table->count;
-        fprintf(file, "%*s%s%*s%s", is_numeric[k] ? pad : 0, "", cell,
-                is_numeric[k] || is_last ? 0 : pad, "", is_last ? "\n" : "  ");
+        fprintf(file, "%s%*s%s%*s%s%s", form->has_colour && i < heads ? "\033[2m" : "",
+                is_numeric[k] ? (int)pad : 0, "", cell, is_numeric[k] || is_last ? 0 : (int)pad, "",
+                form->has_colour && i < heads ? "\033[0m" : "", is_last ? "\n" : "  ");
     }
     if (table->is_failed)
         fputs("... no memory for the rest\n", file);
-    print_table_clear(table);
+    else if (shown < table->count)
+        fprintf(file, "... and %zu more rows\n", (table->count - shown) / all);
 }
 
 typedef struct Printer {
@@ -163,7 +177,8 @@ static void printer_table(Printer *printer, PrintTable *table, const char *headi
     text_fit(printer->heading, sizeof printer->heading, text);
     const size_t rows = table->count / table->columns - (table->has_heads ? 1 : 0);
     printer->longest = rows > printer->longest ? rows : printer->longest;
-    print_table_print(table, printer->file);
+    print_table_print(table, &(PrintTableForm){.width = 0}, printer->file);
+    print_table_clear(table);
 }
 
 // Whether a value fits into a cell: a scalar or a list of scalars.

@@ -12,6 +12,29 @@ enum { LISTING_COLUMNS = 12 };
 // Replaces control characters by '?', in place; NULL is allowed.
 void text_make_printable(char *text);
 
+// A table is filled cell by cell; with heads the first row has the names of the columns. Columns of
+// numbers are right-aligned.
+typedef struct PrintTable {
+    size_t columns, count; // count of cells
+    char **cells;
+    bool has_heads, is_failed; // is_failed: no memory
+} PrintTable;
+
+// Adds the next cell. Control characters, which a terminal would interpret, become '?'.
+void print_table_add(PrintTable *table, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+const char *print_table_cell(const PrintTable *table, size_t index); // "-" below a head if empty
+// Whether a column has heads and, below, nothing but numbers.
+bool print_table_is_numeric(const PrintTable *table, size_t column);
+void print_table_clear(PrintTable *table);
+
+typedef struct PrintTableForm {
+    size_t width; // of a line: texts are shortened, then columns left out; 0: no limit
+    size_t rows;  // below the heads; 0: no limit
+    bool has_colour;
+} PrintTableForm;
+void print_table_print(const PrintTable *table, const PrintTableForm *form, FILE *file);
+
 // The columns of a list of objects, or of the objects that are the members of an object, in this
 // order; empty ones are left out. "errors.psd" is a member of a member. A list without such an
 // entry has all columns.

@@ -133,6 +133,13 @@ static size_t utf8_length(const unsigned char *text) {
     return 0;
 }
 
+size_t text_width(const char *text) {
+    size_t width = 0;
+    for (; *text != '\0'; text++)
+        width += ((unsigned char)*text & 0xC0) != 0x80;
+    return width;
+}
+
 bool text_is_utf8(const char *text) {
     const unsigned char *at = (const unsigned char *)text;
     for (size_t length; *at != '\0'; at += length)

@@ -31,6 +31,8 @@ void bytes_json_string(Bytes *bytes, const char *text);
 // text, NULL is null; %d, %zu and %llu whole numbers. There are no others.
 void bytes_json(Bytes *bytes, const char *format, ...) __attribute__((format(printf, 2, 3)));
 const char *json_flag(bool flag); // "true" or "false"
+// The number of UTF-8 characters; on a terminal most of them take one column.
+size_t text_width(const char *text);
 // Whether all of a text is UTF-8.
 bool text_is_utf8(const char *text);
 // As it is compared where upper and lower case are one: lower case of any script, with a space for

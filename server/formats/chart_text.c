@@ -1,0 +1,394 @@
+// A panel of a chart as text: each character holds 2 x 4 dots of a Braille pattern, or in ASCII
+// 1 x 2 dots. Markers are characters of their own where they are few.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/base/status.h"
+#include "server/formats/chart.h"
+
+enum { TEXT_LABELS = 24, TEXT_LABEL = 24, GLYPHS_MAX = 40, SHADES = 5 };
+
+// Of the palette of chart.c in the terminal's 256 colours: legible on light and on dark ground.
+static const unsigned char text_colours[CHART_COLOURS] = {32,  166, 35, 133, 136, 244,
+                                                          161, 63,  70, 38,  130, 30};
+// Viridis.
+static const unsigned char text_map_colours[] = {54, 60, 31, 36, 71, 112, 184};
+
+typedef struct TextCell {
+    unsigned char dots, colour;
+    const char *glyph; // in place of the dots; NULL: none
+} TextCell;
+
+typedef struct TextCanvas {
+    const ChartText *form;
+    const ChartPanel *panel;
+    size_t columns, rows;
+    int width, height; // in dots
+    TextCell *cells;   // and below them one row for marks on the axis
+} TextCanvas;
+
+static const char *text_glyph(const TextCanvas *canvas, ChartShape shape) {
+    static const char *const utf8[] = {"\u2022", "\u00d7", "\u25cb", "\u2534"};
+    static const char *const ascii[] = {"*", "x", "o", "'"};
+    return (canvas->form->is_utf8 ? utf8 : ascii)[shape];
+}
+
+static TextCell *text_cell(const TextCanvas *canvas, int x, int y) {
+    const int across = canvas->width / (int)canvas->columns;
+    const int down = canvas->height / (int)canvas->rows;
+    return &canvas->cells[(size_t)(y / down) * canvas->columns + (size_t)(x / across)];
+}
+
+static void text_dot(const TextCanvas *canvas, double at_x, double at_y, unsigned char colour) {
+    static const unsigned char bits[4][2] = {
+        {0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
+    const int x = (int)(at_x + 0.5), y = (int)(at_y + 0.5);
+    if (x < 0 || y < 0 || x >= canvas->width || y >= canvas->height)
+        return;
+    TextCell *cell = text_cell(canvas, x, y);
+    cell->dots |= canvas->form->is_utf8 ? bits[y % 4][x % 2] : (unsigned char)(1 << y % 2);
+    cell->colour = colour;
+}
+
+static double text_x(const TextCanvas *canvas, double x) {
+    return chart_axis_share(&canvas->panel->x, x) * (canvas->width - 1);
+}
+
+static double text_y(const TextCanvas *canvas, double y) {
+    return (1 - chart_axis_share(&canvas->panel->y, y)) * (canvas->height - 1);
+}
+
+static void text_line(const TextCanvas *canvas, double x, double y, double to_x, double to_y,
+                      unsigned char colour) {
+    const int steps = (int)fmax(1, ceil(fmax(fabs(to_x - x), fabs(to_y - y))));
+    for (int i = 0; i <= steps; i++)
+        text_dot(canvas, x + (to_x - x) * i / steps, y + (to_y - y) * i / steps, colour);
+}
+
+// Lines through `values`; of many points the mean of each dot.
+static void text_put_line(const TextCanvas *canvas, const ChartSeries *series, const double *values,
+                          unsigned char colour) {
+    const bool is_thinned = series->high == NULL && series->count > 2 * (size_t)canvas->width;
+    double last_x = (double)NAN, last_y = (double)NAN;
+    for (size_t i = 0, end; i < series->count; i = end) {
+        end = i + 1;
+        if (!chart_axis_shows(&canvas->panel->x, series->x[i]) || isnan(values[i])) {
+            last_x = (double)NAN;
+            continue;
+        }
+        const double x = text_x(canvas, series->x[i]);
+        double sum = values[i];
+        while (is_thinned && end < series->count && text_x(canvas, series->x[end]) < floor(x) + 1 &&
+               !isnan(values[end]))
+            sum += values[end++];
+        const double y = text_y(canvas, sum / (double)(end - i));
+        text_line(canvas, isnan(last_x) ? x : last_x, isnan(last_x) ? y : last_y, x, y, colour);
+        last_x = x;
+        last_y = y;
+    }
+}
+
+// Vertical lines from `y` to `high`; those of a band have gaps, so that lines stay visible.
+static void text_put_bars(const TextCanvas *canvas, const ChartSeries *series,
+                          unsigned char colour) {
+    const bool is_band = series->kind == CHART_BAND;
+    for (size_t i = 0; i < series->count; i++) {
+        if (!chart_axis_shows(&canvas->panel->x, series->x[i]) || isnan(series->y[i]) ||
+            isnan(series->high[i]))
+            continue;
+        const double x = text_x(canvas, series->x[i]);
+        double y = ceil(text_y(canvas, series->high[i]) - 0.5);
+        for (; y <= text_y(canvas, series->y[i]) + 0.5; y++)
+            if (!is_band || ((int)(x + 0.5) % 2 == 0 && (int)y % 2 == 0))
+                text_dot(canvas, x, y, colour);
+    }
+}
+
+static void text_put_markers(const TextCanvas *canvas, const ChartSeries *series,
+                             unsigned char colour) {
+    const bool has_glyphs = series->count <= GLYPHS_MAX || series->shape == CHART_TICK;
+    for (size_t i = 0; i < series->count; i++) {
+        if (!chart_axis_shows(&canvas->panel->x, series->x[i]) || isnan(series->y[i]))
+            continue;
+        const double x = text_x(canvas, series->x[i]), y = text_y(canvas, series->y[i]);
+        if (!has_glyphs) {
+            text_dot(canvas, x, y, colour);
+            continue;
+        }
+        TextCell *cell = text_cell(canvas, (int)(x + 0.5), (int)(y + 0.5));
+        if (series->shape == CHART_TICK) // on the axis
+            cell = &canvas->cells[canvas->rows * canvas->columns +
+                                  (size_t)(x + 0.5) * canvas->columns / (size_t)canvas->width];
+        cell->glyph = text_glyph(canvas, series->shape);
+        cell->colour = colour;
+    }
+}
+
+static const char *text_shade(const TextCanvas *canvas, size_t level) {
+    static const char *const utf8[SHADES] = {" ", "\u2591", "\u2592", "\u2593", "\u2588"};
+    static const char *const ascii[SHADES] = {".", ":", "+", "*", "#"};
+    return canvas->form->is_utf8 ? utf8[canvas->form->has_colour ? SHADES - 1 : level]
+                                 : ascii[level];
+}
+
+// Returns the smallest and the largest value.
+static void text_put_map(const TextCanvas *canvas, const ChartSeries *series, double range[2]) {
+    const size_t rows = series->count / series->columns;
+    range[0] = (double)INFINITY;
+    range[1] = -(double)INFINITY;
+    for (size_t i = 0; i < series->count; i++) {
+        range[0] = fmin(range[0], isnan(series->y[i]) ? range[0] : series->y[i]);
+        range[1] = fmax(range[1], isnan(series->y[i]) ? range[1] : series->y[i]);
+    }
+    for (size_t y = 0; y < canvas->rows; y++)
+        for (size_t x = 0; x < canvas->columns; x++) {
+            const size_t row = (canvas->rows - 1 - y) * rows / canvas->rows;
+            const size_t column = x * series->columns / canvas->columns;
+            const double value = series->y[row * series->columns + column];
+            const double share =
+                range[1] > range[0] ? (value - range[0]) / (range[1] - range[0]) : 0.5;
+            TextCell *cell = &canvas->cells[y * canvas->columns + x];
+            if (isnan(value))
+                continue;
+            cell->glyph = text_shade(canvas, (size_t)(share * (SHADES - 1) + 0.5));
+            cell->colour =
+                text_map_colours[(size_t)(share * (double)(COUNT(text_map_colours) - 1) + 0.5)];
+        }
+}
+
+// 0: that of the text.
+static unsigned char text_colour(const ChartSeries *series) {
+    return series->colour == CHART_STRONG ? 0 : text_colours[series->colour % CHART_COLOURS];
+}
+
+static void text_put_series(const TextCanvas *canvas, const ChartSeries *series) {
+    const unsigned char colour = text_colour(series);
+    if (series->kind == CHART_MARKERS)
+        text_put_markers(canvas, series, colour);
+    else if (series->high != NULL)
+        text_put_bars(canvas, series, colour);
+    if (series->kind != CHART_LINE)
+        return;
+    text_put_line(canvas, series, series->y, colour);
+    if (series->high != NULL)
+        text_put_line(canvas, series, series->high, colour);
+}
+
+// --- labels ---
+
+typedef struct TextLabel {
+    size_t at; // a row from the top, or a column
+    char text[TEXT_LABEL];
+} TextLabel;
+
+typedef struct TextLabels {
+    TextLabel of[TEXT_LABELS];
+    size_t count, width;
+} TextLabels;
+
+static void text_label_add(TextLabels *labels, const ChartAxis *axis, size_t cells, double value,
+                           const char *text) {
+    if (labels->count == TEXT_LABELS)
+        return;
+    TextLabel *label = &labels->of[labels->count++];
+    label->at = (size_t)(chart_axis_share(axis, value) * (double)cells * (1 - 1e-9));
+    if (text == NULL)
+        snprintf(label->text, sizeof label->text, "%.4g", value);
+    else
+        text_fit(label->text, sizeof label->text, text);
+    const size_t width = text_width(label->text);
+    labels->width = width > labels->width ? width : labels->width;
+}
+
+static TextLabels text_labels(const ChartAxis *axis, size_t cells, double parts) {
+    TextLabels labels = {.count = 0};
+    const double span = axis->max - axis->min;
+    for (size_t i = 0; i < axis->tick_count; i++)
+        text_label_add(&labels, axis, cells, axis->ticks[i].value, axis->ticks[i].text);
+    if (axis->tick_count > 0)
+        return labels;
+    if (!axis->is_logarithmic) {
+        const double step = chart_axis_step(axis, parts), first = ceil(axis->min / step - 1e-9);
+        for (int i = 0; (first + i) * step <= axis->max + 1e-9 * step; i++)
+            text_label_add(&labels, axis, cells, (first + i) * step, NULL);
+        return labels;
+    }
+    const int every = (int)fmax(1, ceil(span / fmax(parts, 1)));
+    for (int decade = (int)floor(axis->min); decade <= axis->max; decade++)
+        for (int factor = 1; factor <= (span < 2 ? 5 : 1); factor += factor == 1 ? 1 : 3) {
+            const double value = factor * pow(10, decade), at = log10(value);
+            if (at >= axis->min - 1e-9 && at <= axis->max + 1e-9 &&
+                ((int)floor(axis->max + 1e-9) - decade) % every == 0)
+                text_label_add(&labels, axis, cells, value, NULL);
+        }
+    return labels;
+}
+
+// --- lines ---
+
+static void text_paint(const ChartText *form, unsigned char colour, Bytes *bytes) {
+    if (form->has_colour && colour > 0)
+        bytes_format(bytes, "\033[38;5;%dm", colour);
+    else if (form->has_colour)
+        bytes_text(bytes, "\033[0m");
+}
+
+static void text_repeat(Bytes *bytes, const char *text, size_t count) {
+    while (count-- > 0)
+        bytes_text(bytes, text);
+}
+
+static void text_put_cells(const TextCanvas *canvas, size_t row, Bytes *bytes) {
+    static const char *const ascii[] = {" ", "'", ".", ":"};
+    unsigned char colour = 0;
+    for (size_t i = 0; i < canvas->columns; i++) {
+        const TextCell *cell = &canvas->cells[row * canvas->columns + i];
+        const bool is_blank = cell->glyph == NULL && cell->dots == 0;
+        if (!is_blank && cell->colour != colour)
+            text_paint(canvas->form, colour = cell->colour, bytes);
+        const char braille[] = {(char)0xE2, (char)(0xA0 | cell->dots >> 6),
+                                (char)(0x80 | (cell->dots & 0x3F))};
+        if (cell->glyph != NULL || is_blank)
+            bytes_text(bytes, is_blank ? " " : cell->glyph);
+        else if (canvas->form->is_utf8)
+            bytes_put(bytes, braille, sizeof braille);
+        else
+            bytes_text(bytes, ascii[cell->dots & 3]);
+    }
+    if (colour != 0)
+        text_paint(canvas->form, 0, bytes);
+}
+
+static void text_put_rows(const TextCanvas *canvas, const TextLabels *labels, Bytes *bytes) {
+    for (size_t row = 0; row < canvas->rows; row++) {
+        const char *text = "";
+        for (size_t i = 0; i < labels->count; i++)
+            if (canvas->rows - 1 - labels->of[i].at == row)
+                text = labels->of[i].text;
+        text_repeat(bytes, " ", labels->width - text_width(text));
+        bytes_format(bytes, "%s %s", text,
+                     !canvas->form->is_utf8 ? "|"
+                     : *text != '\0'        ? "\u2524"
+                                            : "\u2502");
+        text_put_cells(canvas, row, bytes);
+        bytes_text(bytes, "\n");
+    }
+}
+
+// The axis with the marks on it, and its labels below where there is room.
+static void text_put_axis(const TextCanvas *canvas, size_t margin, const TextLabels *labels,
+                          Bytes *bytes) {
+    const bool is_utf8 = canvas->form->is_utf8;
+    TextCell *line = &canvas->cells[canvas->rows * canvas->columns];
+    size_t end = 0;
+    Bytes below = {.count = 0};
+    for (size_t i = 0; i < labels->count; i++) {
+        const size_t at = labels->of[i].at, width = text_width(labels->of[i].text);
+        size_t start = margin + 2 + at;
+        start -= width / 2 < start ? width / 2 : start;
+        if (start + width > canvas->form->columns)
+            start = canvas->form->columns - width;
+        if (line[at].glyph == NULL)
+            line[at].glyph = is_utf8 ? "\u252c" : "+";
+        if (end > 0 && start < end + 1)
+            continue;
+        text_repeat(&below, " ", start - end);
+        bytes_text(&below, labels->of[i].text);
+        end = start + width;
+    }
+    for (size_t i = 0; i < canvas->columns; i++)
+        if (line[i].glyph == NULL)
+            line[i].glyph = is_utf8 ? "\u2500" : "-";
+    text_repeat(bytes, " ", margin + 1);
+    bytes_text(bytes, is_utf8 ? "\u2514" : "+");
+    text_put_cells(canvas, canvas->rows, bytes);
+    bytes_text(bytes, "\n");
+    bytes_put(bytes, below.at, below.count);
+    bytes_text(bytes, "\n");
+    bytes_clear(&below);
+}
+
+// What the panel shows, and over what.
+static void text_put_heading(const Chart *chart, const TextCanvas *canvas, Bytes *bytes) {
+    const ChartPanel *panel = canvas->panel, *titled = panel;
+    const char *heading = panel->heading != NULL ? panel->heading : chart->heading;
+    while (titled->x.is_unlabelled && titled + 1 < chart->panels + chart->count)
+        titled++;
+    if (heading == NULL && panel->count > 0)
+        heading = panel->series[0].legend != NULL ? panel->series[0].legend : panel->series[0].name;
+    char text[2 * CHART_TEXT], fitted[2 * CHART_TEXT];
+    snprintf(text, sizeof text, "%s%s%s", heading != NULL ? heading : "",
+             titled->x.title != NULL ? " over " : "",
+             titled->x.title != NULL ? titled->x.title : "");
+    text_fit(fitted,
+             canvas->form->columns + 1 < sizeof fitted ? canvas->form->columns + 1 : sizeof fitted,
+             text);
+    bytes_format(bytes, "%s%s%s\n", canvas->form->has_colour ? "\033[1m" : "", fitted,
+                 canvas->form->has_colour ? "\033[0m" : "");
+}
+
+// The legends that fit on one line.
+static void text_put_legend(const TextCanvas *canvas, size_t margin, Bytes *bytes) {
+    const ChartPanel *panel = canvas->panel;
+    size_t used = margin + 2, shown = 0;
+    for (size_t i = 0; i < panel->count; i++) {
+        const ChartSeries *series = &panel->series[i];
+        const size_t width = series->legend != NULL ? text_width(series->legend) + 4 : 0;
+        if (width == 0 || panel->count < 2 || used + width > canvas->form->columns)
+            continue;
+        text_repeat(bytes, " ", shown++ == 0 ? used : 2);
+        text_paint(canvas->form, text_colour(series), bytes);
+        bytes_text(bytes, series->kind == CHART_MARKERS ? text_glyph(canvas, series->shape)
+                          : canvas->form->is_utf8       ? "\u2500"
+                                                        : "-");
+        text_paint(canvas->form, 0, bytes);
+        bytes_format(bytes, " %s", series->legend);
+        used += width;
+    }
+    bytes_text(bytes, shown > 0 ? "\n" : "");
+}
+
+void chart_write_text(Chart *chart, size_t index, const ChartText *form, Bytes *bytes) {
+    if (chart->is_failed || index >= chart->count)
+        return;
+    chart_fit(chart);
+    ChartPanel *panel = &chart->panels[index];
+    TextCanvas canvas = {.form = form, .panel = panel, .rows = form->rows};
+    text_put_heading(chart, &canvas, bytes);
+    if (!panel->has_values) {
+        bytes_text(bytes, "  not known\n");
+        return;
+    }
+    const TextLabels y = text_labels(&panel->y, form->rows, (double)form->rows / 3);
+    canvas.columns = form->columns > y.width + 12 ? form->columns - y.width - 2 : 10;
+    canvas.width = (int)canvas.columns * (form->is_utf8 ? 2 : 1);
+    canvas.height = (int)canvas.rows * (form->is_utf8 ? 4 : 2);
+    canvas.cells = calloc((canvas.rows + 1) * canvas.columns, sizeof *canvas.cells);
+    if (canvas.cells == NULL) {
+        bytes->is_failed = true;
+        return;
+    }
+    const TextLabels x = text_labels(&panel->x, canvas.columns, (double)canvas.columns / 14);
+    double range[2] = {(double)INFINITY, -(double)INFINITY};
+    for (size_t i = panel->count; i-- > 0;)
+        if (panel->series[i].kind == CHART_MAP)
+            text_put_map(&canvas, &panel->series[i], range);
+        else
+            text_put_series(&canvas, &panel->series[i]);
+    text_put_rows(&canvas, &y, bytes);
+    text_put_axis(&canvas, y.width, &x, bytes);
+    text_put_legend(&canvas, y.width, bytes);
+    if (panel->count > 0 && panel->series[0].kind == CHART_MAP && range[0] <= range[1]) {
+        text_repeat(bytes, " ", y.width + 2);
+        for (size_t i = 0; i < COUNT(text_map_colours); i++) {
+            text_paint(form, text_map_colours[i], bytes);
+            bytes_text(bytes,
+                       text_shade(&canvas, i * (SHADES - 1) / (COUNT(text_map_colours) - 1)));
+        }
+        text_paint(form, 0, bytes);
+        bytes_format(bytes, " %.4g to %.4g\n", range[0], range[1]);
+    }
+    free(canvas.cells);
+}
