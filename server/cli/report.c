@@ -164,10 +164,10 @@ static void report_style(const ReportText *text, const char *style) {
 static void report_wrap(const ReportText *text, const char *words, size_t used, int indent) {
     size_t at = used;
     for (bool is_first = true; *words != '\0'; is_first = false) {
-        char word[1000];
         const size_t length = strcspn(words, " ");
-        text_fit(word, length + 1 < sizeof word ? length + 1 : sizeof word, words);
-        const size_t width = text_width(word);
+        size_t width = 0;
+        for (size_t i = 0; i < length; i++)
+            width += ((unsigned char)words[i] & 0xC0) != 0x80;
         if (!is_first && at + 1 + width > text->terminal->columns) {
             fprintf(text->file, "\n%*s", indent, "");
             at = (size_t)indent;
@@ -175,7 +175,7 @@ static void report_wrap(const ReportText *text, const char *words, size_t used, 
             fputc(' ', text->file);
             at++;
         }
-        fputs(word, text->file);
+        fprintf(text->file, "%.*s", (int)length, words);
         at += width;
         words += length + strspn(words + length, " ");
     }
@@ -208,7 +208,7 @@ static void report_put_section(const ReportText *text, ReportSection *section) {
                           text->file);
     Bytes chart = {.count = 0};
     for (size_t i = 0; section->chart != NULL && i < section->panels; i++)
-        chart_write_text(section->chart, i,
+        chart_write_text(section->chart, section->first + i,
                          &(ChartText){terminal->columns, section->height, terminal->is_utf8,
                                       terminal->has_colour},
                          &chart);
@@ -252,9 +252,8 @@ static void report_put(const ReportText *text, Report *report, const Texts *file
     if (report->next != NULL) {
         fputs("Next  ", text->file);
         report_style(text, "36");
-        fputs(report->next, text->file);
+        report_wrap(text, report->next, 6, 6);
         report_style(text, "0");
-        fputc('\n', text->file);
     }
 }
 
@@ -288,13 +287,14 @@ static const char report_style_sheet[] =
     "h1 { font-size: 1.6rem; line-height: 1.25; margin: .5rem 0; }\n"
     "h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; }\n"
     "p { margin: 0 0 .7rem; }\n"
-    ".scroll { overflow-x: auto; }\n"
-    "table { border-collapse: collapse; font-variant-numeric: tabular-nums; }\n"
-    "th, td { padding: .25rem .8rem .25rem 0; text-align: left; vertical-align: top; "
+    ".scroll { overflow-x: auto; margin: 0 0 1rem; }\n"
+    "table { border-collapse: collapse; font-variant-numeric: tabular-nums; overflow-wrap: normal; "
+    "}\n"
+    "th, td { padding: .25rem 1rem .25rem 0; text-align: left; vertical-align: top; "
     "border-bottom: 1px solid var(--line); }\n"
-    "thead th { color: var(--quiet); font-weight: 600; }\n"
+    "thead th { color: var(--quiet); }\n"
     "tbody th { font-weight: normal; }\n"
-    "th.n, td.n { text-align: right; padding: .25rem 0 .25rem 1.2rem; white-space: nowrap; }\n"
+    "th.n, td.n { text-align: right; white-space: nowrap; }\n"
     "figure { margin: 0; overflow-x: auto; }\n"
     "figure svg { display: block; width: 100%; min-width: 36rem; }\n"
     ".notes li { border-left: 4px solid var(--warn); background: var(--soft); list-style: none; "

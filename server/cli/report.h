@@ -15,8 +15,8 @@ typedef struct ReportSection {
     PrintTable table;
     size_t rows; // of the table on a terminal; 0: all
     Chart *chart;
-    size_t panels, height; // on a terminal: the first panels, rows of each; 0: none
-    bool is_page_only;     // not for a terminal
+    size_t first, panels, height; // on a terminal: panels and rows of each; 0: none
+    bool is_page_only;            // not for a terminal
 } ReportSection;
 
 typedef struct Report {

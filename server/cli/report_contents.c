@@ -90,11 +90,13 @@ static void run_add_effect(Report *report, const Simulation *simulation,
 }
 
 // The numbers of the report, beside those without dampers where they are known.
-static void run_add_numbers(Report *report, const Outcome *outcome) {
+static void run_add_numbers(Report *report, const Outcome *outcome, bool is_one) {
     const bool has_effect = outcome->has_reduction;
     PrintTable *table =
-        report_table(report, "Response",
-                     has_effect ? "quantity|with dampers|without|change [%]" : "quantity|value");
+        report_table(report, NULL,
+                     has_effect ? is_one ? "response|with damper|without|change [%]"
+                                         : "response|with dampers|without|change [%]"
+                                : "response|value");
     for (const Field *row = summary_fields; row->kind != FIELD_KIND_END; row++) {
         char name[80];
         size_t offset = 0;
@@ -168,7 +170,7 @@ static void run_add_facts(Report *report, const Outcome *outcome, double duratio
     const Response *response = &outcome->response;
     const Impact *largest = run_largest_impact(response);
     const PlanModes *modes = &outcome->plan.modes;
-    PrintTable *table = report_table(report, "Contacts and accuracy", NULL);
+    PrintTable *table = report_table(report, NULL, NULL);
     char rest[80] = "", where[120] = "";
     if (response->resting_count > 0)
         snprintf(rest, sizeof rest, ", %llu intervals of persistent contact",
@@ -325,7 +327,7 @@ void report_of_run(Report *report, const Simulation *simulation, const Outcome *
                     outcome->plan.solver, seconds_text(took, seconds));
     if (outcome->has_reduction)
         run_add_effect(report, simulation, &outcome->reduction);
-    run_add_numbers(report, outcome);
+    run_add_numbers(report, outcome, scene->dampers.count == 1);
     run_add_facts(report, outcome, scene->duration);
     run_add_motion(report, outcome, scene->duration);
     if (outcome->spectrum.densities.count > 0)
@@ -461,10 +463,11 @@ static void ensemble_report(Report *report, const Variant *answer, double second
     (void)study_add_chart(report, "Spectra and spread", answer, 1, 10);
 }
 
-// The values of a point's axes.
-static void sweep_add_place(PrintTable *table, const Sweep *sweep, size_t point) {
+// The values of the axes in a row; SIZE_MAX: none.
+static void sweep_add_place(PrintTable *table, const Sweep *sweep, size_t row) {
     char text[200] = "";
-    for (size_t a = 0; a < sweep->axes.count; a++) {
+    for (size_t a = 0; a < sweep->axes.count && row != SIZE_MAX; a++) {
+        const size_t point = (size_t)sweep->table.points.at[row];
         const char *json = sweep->axes.at[a].values.at[sweep_value_index(sweep, a, point)];
         PrintTable one = {.columns = 1};
         scalar_add(&one, json);
@@ -518,32 +521,46 @@ static void sweep_report(Report *report, const Variant *answer, double seconds) 
     const Sweep *sweep = (const Sweep *)(const void *)answer;
     const bool is_map = sweep->axes.count > 1 && sweep->mode == SWEEP_GRID;
     sweep_add_axes(report, sweep, seconds);
-    PrintTable *table =
-        report_table(report, "Smallest and largest values", "quantity|smallest|at|largest|at");
-    for (size_t m = 0; m < sweep->metrics.count; m++) {
-        size_t ends[2] = {0};
-        report_quantity(table, sweep->metrics.at[m], sweep_metric_unit(sweep->metrics.at[m]));
-        const bool is_known = sweep_find_ends(sweep, m, ends);
-        for (size_t end = 0; end < 2; end++)
-            if (is_known) {
-                report_real(table, sweep->table.values.at[ends[end] * sweep->metrics.count + m]);
-                sweep_add_place(table, sweep, (size_t)sweep->table.points.at[ends[end]]);
-            } else {
-                print_table_add(table, "%s", "");
-                print_table_add(table, "%s", "");
+    // Values of several axes need a table for each end.
+    const size_t tables = sweep->axes.count > 1 ? 2 : 1;
+    for (size_t t = 0; t < tables; t++) {
+        PrintTable *table = report_table(report, NULL,
+                                         tables == 1 ? "quantity|smallest|at|largest|at"
+                                         : t == 0    ? "quantity|smallest|at"
+                                                     : "quantity|largest|at");
+        for (size_t m = 0; m < sweep->metrics.count; m++) {
+            size_t ends[2] = {0};
+            const bool is_known = sweep_find_ends(sweep, m, ends);
+            report_quantity(table, sweep->metrics.at[m], sweep_metric_unit(sweep->metrics.at[m]));
+            for (size_t end = t; end < (tables == 1 ? 2 : t + 1); end++) {
+                const double *values = sweep->table.values.at + m;
+                report_real(table,
+                            is_known ? values[ends[end] * sweep->metrics.count] : (double)NAN);
+                sweep_add_place(table, sweep, is_known ? ends[end] : SIZE_MAX);
             }
+        }
     }
     Chart *chart =
         study_add_chart(report, "Metrics over the axis", answer, is_map ? 1 : 2, is_map ? 10 : 7);
+    // The first of these where it is among the metrics.
+    for (size_t m = 0; m < sweep->metrics.count && m < CHART_PANELS; m++)
+        if (strcmp(sweep->metrics.at[m], "rms_displacement") == 0)
+            report->sections[report->count - 1].first = m;
     for (size_t i = 0; chart != NULL && i < chart->count && !is_map; i++) {
         const ChartSeries *line = &chart->panels[i].series[0];
         size_t best = 0;
         for (size_t k = 1; k < line->count; k++)
             best = isnan(line->y[best]) || line->y[k] < line->y[best] ? k : best;
-        if (line->count > 0)
-            chart_add(&chart->panels[i],
-                      (ChartSeries){CHART_MARKERS, line->x + best, line->y + best, NULL, 1,
-                                    .colour = 1, .shape = CHART_RING, .legend = "smallest"});
+        if (line->count == 0)
+            continue;
+        chart_add(&chart->panels[i],
+                  (ChartSeries){CHART_MARKERS, line->x + best, line->y + best, NULL, 1, .colour = 1,
+                                .shape = CHART_RING, .legend = "smallest"});
+        // In front.
+        ChartSeries *series = chart->panels[i].series, *last = &series[chart->panels[i].count - 1];
+        const ChartSeries first = series[0];
+        series[0] = *last;
+        *last = first;
     }
 }
 
@@ -672,16 +689,19 @@ static void optimum_report(Report *report, const Variant *answer, double seconds
     study_add_runs(report, &optimum->made, what, seconds);
     for (size_t i = 0; i < best->objectives.count; i++) {
         const OptimumObjective *objective = &best->objectives.at[i];
-        const double given = optimum->given.metrics.of[objective->metric];
+        const double change =
+            100 * (objective->value / optimum->given.metrics.of[objective->metric] - 1);
         const char *unit = study_metric_unit(objective->metric);
-        char change[32], interval[80] = "";
+        char interval[80] = "", against[60] = "";
         if (objective->interval_95.count == 2)
             snprintf(interval, sizeof interval, " (95 %% from %.6g to %.6g)",
                      objective->interval_95.at[0], objective->interval_95.at[1]);
-        report_sentence(report, "Best %s: %.6g%s%s%s, %s %% of that as given.",
-                        study_metric_names[objective->metric], objective->value,
-                        unit != NULL ? " " : "", unit_text(unit), interval,
-                        optimum_change(change, objective->value, given));
+        if (isfinite(change))
+            snprintf(against, sizeof against, ", %.3g %% %s than as given", fabs(change),
+                     change < 0 ? "lower" : "higher");
+        report_sentence(report, "Best %s: %.6g%s%s%s%s.", study_metric_names[objective->metric],
+                        objective->value, unit != NULL ? " " : "", unit_text(unit), interval,
+                        against);
     }
     if (best->values.count > 0)
         optimum_add_best(report, optimum);
@@ -725,12 +745,13 @@ static void calibration_report(Report *report, const Variant *answer, double sec
     report_sentence(report, "Verdict: %s; %s.", calibrate_verdict_names[calibration->verdict],
                     unit_text(calibration->detail));
     PrintTable *table =
-        report_table(report, "Fitted values", "parameter|value|unit|95 % from|95 % to|determined");
+        report_table(report, "Fitted values", "parameter|value|95 % from|95 % to|determined");
     for (size_t i = 0; i < calibration->parameters.count; i++) {
         const CalibratedParameter *parameter = &calibration->parameters.at[i];
-        print_table_add(table, "%s", parameter->member.pointer);
+        print_table_add(table, "%s%s%s%s", parameter->member.pointer,
+                        parameter->unit != NULL ? " [" : "", unit_text(parameter->unit),
+                        parameter->unit != NULL ? "]" : "");
         report_real(table, parameter->value);
-        print_table_add(table, "%s", unit_text(parameter->unit));
         report_real(table, interval_end(&parameter->interval_95, 0));
         report_real(table, interval_end(&parameter->interval_95, 1));
         print_table_add(

@@ -11,6 +11,7 @@
 #include "core/study/tradeoff.h"
 #include "server/api/job_json.h"
 #include "server/cli/files.h"
+#include "server/cli/report.h"
 #include "server/formats/study_formats.h"
 #include "server/formats/table_stream.h"
 #include "server/jobs/documents.h"
@@ -31,14 +32,21 @@ static SimulationLimits scene_limits(double cpu_seconds) {
                               .bytes = SIMULATION_BYTES};
 }
 
+// An output that is a page is no format of tables.
+static const char page_extension[] = "html";
+
+static bool path_is_page(const char *path) {
+    return path != NULL && text_same(path_extension(path), page_extension);
+}
+
 static void warnings_print(const char *path, const Warnings *warnings) {
     for (size_t i = 0; i < warnings->count; i++)
         fprintf(stderr, "%s: warning: %s: %s\n", input_name(path), warnings->at[i].pointer,
                 warnings->at[i].detail);
 }
 
-// Reads and resolves a scene and prints its warnings. Both outputs are cleared in any case.
-static Status scene_prepare(const char *path, const Bytes *text, const RecordFiles *records,
+// Reads and resolves a scene. Both outputs are cleared in any case.
+static Status scene_prepare(const Bytes *text, const RecordFiles *records,
                             const SimulationLimits *limits, StudyRequest *request,
                             Warnings *warnings, Problem *problem) {
     Db *db = NULL;
@@ -49,22 +57,22 @@ static Status scene_prepare(const char *path, const Bytes *text, const RecordFil
     if (status == STATUS_OK)
         status = jobs_prepare(db, text->at, text->count, limits, request, warnings, problem);
     db_close(db);
-    if (status == STATUS_OK)
-        warnings_print(path, warnings);
     return status;
 }
 
 typedef struct RunSettings {
     char *output;
+    bool json;
     Texts record;
     int unit;
     double max_cpu_seconds;
-    const TableFormat *format; // of the output's extension; NULL without output
+    const TableFormat *format; // of the output's extension; NULL without output, or for a page
 } RunSettings;
 
 static const Field run_fields[] = {
     FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
                "write to this file; its extension says what"),
+    FIELD_FLAG(RunSettings, json, false, "print the finished job as JSON, also on a terminal"),
     RECORD_ROWS(RunSettings),
     CPU_ROW(RunSettings),
     FIELD_END,
@@ -91,7 +99,7 @@ static Status impacts_fill(TableStream *stream, Problem *problem) {
 // {job, series, impacts, psd}, each as the server sends it.
 static Status whole_write(Outcome *outcome, const Bytes *job, Bytes *bytes, Problem *problem) {
     bytes_text(bytes, "{\"job\": ");
-    bytes_put(bytes, job->at, job->count);
+    bytes_put(bytes, job->at, job->count - 1); // without its line feed
     bytes_text(bytes, ",\n\"series\": ");
     TRY(table_write(outcome, &format_json, false, table_stream_series, bytes, problem));
     bytes_text(bytes, ",\n\"impacts\": ");
@@ -141,10 +149,59 @@ static Status job_write(const StudyRequest *request, const Warnings *warnings,
     return bytes->is_failed ? STATUS_NO_MEMORY : status;
 }
 
+// What a run or a study leaves for its report; one of outcome and answer.
+typedef struct Finding {
+    const char *path; // of the scene
+    const StudyRequest *request;
+    const Warnings *warnings;
+    const Outcome *outcome;
+    const Variant *answer;
+    double took; // [s]
+} Finding;
+
+static void finding_report(const Finding *finding, Report *report) {
+    report_title(report, finding->request->simulation.title);
+    if (finding->answer != NULL)
+        report_of_study(report, finding->answer, finding->took);
+    else
+        report_of_run(report, &finding->request->simulation, finding->outcome, finding->took);
+    report_notes(report, finding->warnings);
+}
+
+static Status finding_write_page(const Finding *finding, Bytes *bytes, Problem *problem) {
+    Report report = {.is_page = true};
+    Bytes scene = {0};
+    char result[72];
+    jobs_result_id(finding->request, result);
+    document_scene(&scene, finding->request);
+    finding_report(finding, &report);
+    if (!scene.is_failed)
+        report_write_page(&report, &(ReportPage){input_name(finding->path), result, &scene}, bytes);
+    if (scene.is_failed || bytes->is_failed || report.is_failed)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the page");
+    report_clear(&report);
+    bytes_clear(&scene);
+    return STATUS_OK;
+}
+
+static void finding_print(const Finding *finding, const char *name, const Terminal *terminal,
+                          const Texts *files) {
+    Report report = {.is_page = false};
+    finding_report(finding, &report);
+    if (report.next == NULL && files->count == 0)
+        report_next(&report, "impactd %s %s -o report.html", name,
+                    finding->path);
+    report_print(&report, terminal, files);
+    report_clear(&report);
+}
+
 // Runs and prints or writes.
 static Status scene_run(const char *path, const StudyRequest *request, const Warnings *warnings,
                         const RunSettings *settings, Problem *problem) {
     const SimulationLimits limits = scene_limits(settings->max_cpu_seconds);
+    const bool is_page = path_is_page(settings->output);
+    Terminal terminal;
+    const bool has_report = !settings->json && terminal_find(&terminal);
     Outcome *outcome = NULL;
     Bytes job = {0}, table = {0};
     ProgressBar bar;
@@ -154,24 +211,32 @@ static Status scene_run(const char *path, const StudyRequest *request, const War
     Status status = simulation_run(&request->simulation, &limits, &watch, NULL, &outcome, problem);
     progress_bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
-    if (status == STATUS_OK) {
+    const Finding finding = {path, request, warnings, outcome, NULL, took};
+    if (status == STATUS_OK && !has_report) {
+        warnings_print(path, warnings);
         warnings_print(path, &outcome->warnings);
-        status = job_write(request, warnings, outcome, began_unix_ms, took, &job);
     }
-    if (status == STATUS_OK && settings->format == NULL)
-        bytes_text(&job, "\n");
-    else if (status == STATUS_OK)
-        status = settings->format == &format_json
-                     ? whole_write(outcome, &job, &table, problem)
-                     : table_write(outcome, settings->format, false, table_stream_series, &table,
-                                   problem);
+    if (status == STATUS_OK)
+        status = job_write(request, warnings, outcome, began_unix_ms, took, &job);
+    bytes_text(&job, "\n");
+    if (status == STATUS_OK && is_page)
+        status = finding_write_page(&finding, &table, problem);
+    else if (status == STATUS_OK && settings->format == &format_json)
+        status = whole_write(outcome, &job, &table, problem);
+    else if (status == STATUS_OK && settings->format != NULL)
+        status =
+            table_write(outcome, settings->format, false, table_stream_series, &table, problem);
     if (status == STATUS_NO_MEMORY || job.is_failed || table.is_failed)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");
-    const Bytes *whole = settings->format != NULL ? &table : &job;
-    if (status == STATUS_OK)
-        status = output_write(whole->at, whole->count, problem);
+    if (status == STATUS_OK && settings->output != NULL)
+        status = output_write(table.at, table.count, problem);
     if (status == STATUS_OK)
         status = output_close(problem);
+    if (status == STATUS_OK && has_report)
+        finding_print(&finding, "run", &terminal,
+                      &(Texts){(char **)(uintptr_t)&settings->output, settings->output != NULL});
+    else if (status == STATUS_OK && (settings->json || settings->output == NULL))
+        status = output_write(job.at, job.count, problem);
     bytes_clear(&job);
     bytes_clear(&table);
     outcome_unref(outcome);
@@ -183,8 +248,8 @@ static Status run_scene(const char *path, const Bytes *text, void *of, Problem *
     const SimulationLimits limits = scene_limits(settings->max_cpu_seconds);
     StudyRequest request;
     Warnings warnings;
-    Status status = scene_prepare(path, text, &(RecordFiles){settings->record, settings->unit},
-                                  &limits, &request, &warnings, problem);
+    Status status = scene_prepare(text, &(RecordFiles){settings->record, settings->unit}, &limits,
+                                  &request, &warnings, problem);
     if (status == STATUS_OK && request.study != NULL)
         status = problem_add(problem, STATUS_INVALID, "/study",
                              "is not for `run`, which runs the scene alone: `impactd study` makes "
@@ -209,7 +274,7 @@ static int run(const Command *self, void *of, const Options *options, Problem *p
     RunSettings *settings = of;
     const char *extension = settings->output != NULL ? path_extension(settings->output) : NULL;
     settings->format = extension != NULL ? format_find(extension) : NULL;
-    if (settings->output == NULL || settings->format != NULL)
+    if (settings->output == NULL || settings->format != NULL || path_is_page(settings->output))
         return input_command(self, "scene", options, settings, run_scene, problem);
     char names[128] = "";
     for (size_t i = 0; table_formats[i] != NULL; i++) {
@@ -217,6 +282,7 @@ static int run(const Command *self, void *of, const Options *options, Problem *p
         snprintf(ending, sizeof ending, ".%s", table_formats[i]->extension);
         text_list(names, sizeof names, ending);
     }
+    text_list(names, sizeof names, ".html");
     (void)output_refuse(settings->output, names, problem);
     return command_error(self->name, problem);
 }
@@ -226,7 +292,8 @@ const Command command_run = {
     .operands = "SCENE.json",
     .summary = "run one scene here, without a server",
     .help =
-        "  impactd run scene.json                 print the finished job\n"
+        "  impactd run scene.json                 numbers and charts; piped: the job as JSON\n"
+        "  impactd run scene.json -o report.html  the same as one page, with all details\n"
         "  impactd run scene.json -o out.csv      write the time series, as a table\n"
         "  impactd run scene.json -o out.npy      the same for numpy.load; .npz by names\n"
         "  impactd run scene.json -o out.mat      the same for MATLAB and Octave\n"
@@ -343,8 +410,6 @@ typedef struct StudyCommand {
     // Puts the flags into the document's study of this kind, or into a new one; may take what
     // `settings` own. NULL: there are no flags.
     void (*choose)(void *study, StudySettings *settings);
-    // Appends members, which are shown too, to the answer's object. NULL: none.
-    void (*add)(const Variant *answer, Bytes *json);
 } StudyCommand;
 
 #define OUTPUT_ROW(formats)                                                                        \
@@ -366,53 +431,50 @@ static Status study_check_outputs(const StudyKind *kind, const Texts *outputs, P
     Status status = STATUS_OK;
     char names[64];
     study_formats_names(study_formats(kind->answer), ".", names, sizeof names);
+    text_list(names, sizeof names, ".html");
     for (size_t i = 0; i < outputs->count; i++)
-        if (study_format(kind, outputs->at[i]) == NULL)
+        if (study_format(kind, outputs->at[i]) == NULL && !path_is_page(outputs->at[i]))
             status = output_refuse(outputs->at[i], names, problem);
     return status;
 }
 
-// `path` NULL: to standard output.
-static Status study_write(const TableFormat *format, const char *path,
-                          const StudyDocument *document, Problem *problem) {
+// `path` NULL: to standard output, as JSON.
+static Status study_write(const Finding *finding, const char *path, const StudyDocument *document,
+                          Problem *problem) {
     Bytes bytes = {0};
-    study_format_write(format, document, &bytes);
-    const Status status = bytes.is_failed
-                              ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
-                              : output_put(path, &bytes, problem);
+    Status status = STATUS_OK;
+    if (path_is_page(path))
+        status = finding_write_page(finding, &bytes, problem);
+    else
+        study_format_write(path != NULL ? study_format(study_kind(finding->request->study), path)
+                                        : &format_json,
+                           document, &bytes);
+    if (status == STATUS_OK)
+        status = bytes.is_failed
+                     ? problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer")
+                     : output_put(path, &bytes, problem);
     bytes_clear(&bytes);
     return status;
 }
 
-// The answer as tables, with the units of its rows.
-static Status study_print(const Command *command, const Variant *answer, Problem *problem) {
-    const Field *const fields[] = {answer->kind->fields, NULL};
-    PrintTableView view = *command->view;
-    Bytes json = {0};
-    view.fields = fields;
-    document_answer(&json, answer);
-    if (command->study->add != NULL && json.count > 1) {
-        json.count -= 1; // "}"
-        command->study->add(answer, &json);
-        bytes_text(&json, "}");
-    }
-    const Status status = print_table_print_json(&json, &view, stdout, NULL, problem);
-    bytes_clear(&json);
-    return status;
-}
-
-static Status study_make(const StudyRequest *request, const StudySettings *settings,
-                         const SimulationLimits *limits, Problem *problem) {
-    const Command *command = settings->command;
-    const StudyKind *kind = study_kind(request->study);
+static Status study_make(const char *path, const StudyRequest *request, const Warnings *warnings,
+                         const StudySettings *settings, const SimulationLimits *limits,
+                         Problem *problem) {
     const Texts *outputs = &settings->output;
+    Terminal terminal;
+    const bool has_report = !settings->json && terminal_find(&terminal);
     ProgressBar bar;
     Variant *answer = NULL;
+    const int64_t began_ns = clock_monotonic_ns();
+    if (!has_report)
+        warnings_print(path, warnings);
     progress_bar_start(&bar);
     const Progress watch = progress_bar_watch(&bar);
     Status status =
         jobs_run_study(request->study, &request->simulation, limits, &watch, &answer, problem);
     progress_bar_stop(&bar);
+    const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
+    const Finding finding = {path, request, warnings, NULL, answer, took};
     char result[72];
     Bytes scene = {0};
     jobs_result_id(request, result);
@@ -422,13 +484,11 @@ static Status study_make(const StudyRequest *request, const StudySettings *setti
     const StudyDocument document = {answer, result, scene.at};
     // First, so that they are there where the reader of the standard output ends early.
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
-        status =
-            study_write(study_format(kind, outputs->at[i]), outputs->at[i], &document, problem);
-    // The document's own study prints nothing where it is written to files.
-    if (status == STATUS_OK && (settings->json || (command->view == NULL && outputs->count == 0)))
-        status = study_write(&format_json, NULL, &document, problem);
-    else if (status == STATUS_OK && command->view != NULL)
-        status = study_print(command, answer, problem);
+        status = study_write(&finding, outputs->at[i], &document, problem);
+    if (status == STATUS_OK && has_report)
+        finding_print(&finding, settings->command->name, &terminal, outputs);
+    else if (status == STATUS_OK && (settings->json || outputs->count == 0))
+        status = study_write(&finding, NULL, &document, problem);
     bytes_clear(&scene);
     variant_free(answer);
     return status;
@@ -477,8 +537,8 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     const Texts *outputs = &settings->output;
     StudyRequest request;
     Warnings warnings;
-    Status status = scene_prepare(path, text, &(RecordFiles){settings->record, settings->unit},
-                                  &limits, &request, &warnings, problem);
+    Status status = scene_prepare(text, &(RecordFiles){settings->record, settings->unit}, &limits,
+                                  &request, &warnings, problem);
     if (status == STATUS_OK)
         status = study_choose(&request, settings, problem);
     if (status == STATUS_OK)
@@ -491,7 +551,7 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     for (size_t i = 0; i < outputs->count && status == STATUS_OK; i++)
         status = output_check(outputs->at[i], problem);
     if (status == STATUS_OK)
-        status = study_make(&request, settings, &limits, problem);
+        status = study_make(path, &request, &warnings, settings, &limits, problem);
     study_request_clear(&request);
     warnings_clear(&warnings);
     return status;
@@ -504,10 +564,10 @@ static int study_command_run(const Command *self, void *of, const Options *optio
 }
 
 // The members of a command that all of these have alike.
-#define STUDY_COMMAND(name_text, kind, choose, add)                                                \
+#define STUDY_COMMAND(name_text, kind, choose)                                                     \
     .name = name_text, .operands = "SCENE.json", .size = sizeof(StudySettings),                    \
     .run = study_command_run, .study = &(const StudyCommand) {                                     \
-        kind, choose, add                                                                          \
+        kind, choose                                                                               \
     }
 
 // Of the studies whose request is all in the scene.
@@ -520,7 +580,7 @@ static const Field study_fields[] = {
 };
 
 const Command command_study = {
-    STUDY_COMMAND("study", NULL, NULL, NULL),
+    STUDY_COMMAND("study", NULL, NULL),
     .summary = "make the study that a scene asks for: compare, sensitivity and the others",
     .help =
         "  impactd study scene.json                       the answer as JSON\n"
@@ -551,14 +611,6 @@ static const Field tradeoff_fields[] = {
     FIELD_END,
 };
 
-static const PrintTableView tradeoff_view = {
-    .skipped = (const char *const[]){"kind", "trial", "largest", NULL},
-    .lists = (const PrintTableColumns[]){
-        {"points",
-         {"name", "is_best", "cpu_minimum", "steps", "errors.displacement",
-          "errors.mean_acceleration", "errors.peak_force", "errors.impacts", "errors.psd", "why"}},
-        {NULL, {NULL}}}};
-
 static void tradeoff_choose(void *asked, StudySettings *settings) {
     TradeoffStudy *study = (TradeoffStudy *)(void *)asked;
     if (settings->metric != CHOICE_ABSENT && settings->metric != study->metric) {
@@ -579,7 +631,7 @@ static void tradeoff_choose(void *asked, StudySettings *settings) {
 }
 
 const Command command_tradeoff = {
-    STUDY_COMMAND("tradeoff", &study_tradeoff, tradeoff_choose, NULL),
+    STUDY_COMMAND("tradeoff", &study_tradeoff, tradeoff_choose),
     .summary = "try solvers and steps on a scene: error against CPU time",
     .help =
         "  impactd tradeoff scene.json                          the table, and what to take\n"
@@ -595,7 +647,6 @@ const Command command_tradeoff = {
         "little. Ctrl-C stops at once. Exit code 3 if the scene has faults, 1 if its\n"
         "exact run failed.\n",
     .options = tradeoff_fields,
-    .view = &tradeoff_view,
 };
 
 // Ranges and defaults are the study's own.
@@ -630,38 +681,8 @@ static void ensemble_choose(void *asked, StudySettings *settings) {
         study->metric = settings->metric;
 }
 
-static const PrintTableView ensemble_view = {
-    .skipped = (const char *const[]){"kind", "table", "frequency", "spectra", "time",
-                                     "displacement", NULL},
-    .lists = (const PrintTableColumns[]){
-        {"statistics",
-         {"mean", "low", "high", "standard_deviation", "minimum", "median", "maximum"}},
-        {NULL, {NULL}}}};
-
-// The peaks of the mean spectra.
-static void ensemble_add(const Variant *answer, Bytes *json) {
-    const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
-    bytes_text(json, ", \"peaks\": [");
-    for (size_t i = 0; i < ensemble->spectra.count; i++) {
-        const RunSpectrum *spectrum = &ensemble->spectra.at[i];
-        size_t peak = 0;
-        for (size_t k = 1; k < spectrum->mean.count; k++)
-            if (spectrum->mean.at[k] > spectrum->mean.at[peak])
-                peak = k;
-        const bool has_interval = spectrum->low.count > 0;
-        bytes_text(json, i > 0 ? ", " : "");
-        bytes_json(json,
-                   "{\"psd of\": %s, \"largest at [Hz]\": %g, \"mean\": %g, \"low\": %g, "
-                   "\"high\": %g, \"unit\": %s}",
-                   spectrum->channel, ensemble->frequency.at[peak], spectrum->mean.at[peak],
-                   has_interval ? spectrum->low.at[peak] : (double)NAN,
-                   has_interval ? spectrum->high.at[peak] : (double)NAN, spectrum->unit);
-    }
-    bytes_text(json, "]");
-}
-
 const Command command_ensemble = {
-    STUDY_COMMAND("ensemble", &study_ensemble, ensemble_choose, ensemble_add),
+    STUDY_COMMAND("ensemble", &study_ensemble, ensemble_choose),
     .summary = "many seeds or uncertain inputs: means with their confidence, and spread",
     .help =
         "  impactd ensemble scene.json                          64 seeds: statistics and spectra\n"
@@ -678,7 +699,6 @@ const Command command_ensemble = {
         "out. The same study gives the same bytes. Ctrl-C stops at once. Exit code 3 if\n"
         "the scene has faults.\n",
     .options = ensemble_fields,
-    .view = &ensemble_view,
 };
 
 static const Field sweep_fields[] = {
@@ -689,38 +709,8 @@ static const Field sweep_fields[] = {
     FIELD_END,
 };
 
-static const PrintTableView sweep_view = {
-    .skipped = (const char *const[]){"kind", "status", "done", "columns", NULL},
-};
-
-// The extremes of each metric, and the points where they are.
-static void sweep_add(const Variant *answer, Bytes *json) {
-    const Sweep *sweep = (const Sweep *)(const void *)answer;
-    const size_t metrics = sweep->metrics.count;
-    bytes_text(json, ", \"extremes\": {");
-    for (size_t m = 0; m < metrics; m++) {
-        const double *values = sweep->table.values.at + m;
-        double ends[2] = {(double)NAN, (double)NAN}, points[2] = {(double)NAN, (double)NAN};
-        for (size_t i = 0; i < sweep->table.points.count; i++) {
-            const double value = values[i * metrics];
-            for (int end = 0; end < 2; end++)
-                if (!isnan(value) && !(end == 0 ? value >= ends[0] : value <= ends[1])) {
-                    ends[end] = value;
-                    points[end] = (double)i;
-                }
-        }
-        bytes_text(json, m > 0 ? ", " : "");
-        bytes_json_string(json, sweep->metrics.at[m]);
-        bytes_json(json,
-                   ": {\"unit\": %s, \"smallest\": %g, \"at point\": %g, \"largest\": %g, "
-                   "\"and at point\": %g}",
-                   sweep_metric_unit(sweep->metrics.at[m]), ends[0], points[0], ends[1], points[1]);
-    }
-    bytes_text(json, "}");
-}
-
 const Command command_sweep = {
-    STUDY_COMMAND("sweep", &study_sweep, NULL, sweep_add),
+    STUDY_COMMAND("sweep", &study_sweep, NULL),
     .summary = "the scene at many points: a grid or a list of values of its members",
     .help = "  impactd sweep scene.json                             smallest and largest of each "
             "metric\n"
@@ -738,7 +728,6 @@ const Command command_sweep = {
             "bytes, here and by a server, which uses all its workers. Exit code 3 if the\n"
             "scene has faults.\n",
     .options = sweep_fields,
-    .view = &sweep_view,
 };
 
 // Of the studies that design: what is printed, and the study in the scene.
@@ -754,66 +743,8 @@ const Command command_sweep = {
     "\n"                                                                                           \
     "Exit code 3 if the scene has faults.\n"
 
-static const PrintTableView optimize_view = {
-    .skipped = (const char *const[]){"kind", "history", "metrics", "given", "undamped", "front",
-                                     "rivals", NULL},
-    .lists = (const PrintTableColumns[]){{"values", {"pointer", "value"}},
-                                         {"objectives", {"metric", "goal", "value", "interval_95"}},
-                                         {"gain", {"metric", "best", "given", "undamped", "unit"}},
-                                         {NULL, {NULL}}},
-};
-
-static void optimize_put_metrics(const Optimum *optimum, Bytes *json) {
-    const bool has_best = optimum->best.values.count > 0;
-    const char *between = "";
-    for (int m = 0; m < STUDY_METRIC_COUNT; m++)
-        if (!isnan(optimum->given.metrics.of[m])) {
-            bytes_json(json,
-                       "%p{\"metric\": %s, \"best\": %g, \"given\": %g, \"undamped\": %g, "
-                       "\"unit\": %s}",
-                       between, study_metric_names[m],
-                       has_best ? optimum->best.metrics.of[m] : (double)NAN,
-                       optimum->given.metrics.of[m], optimum->undamped.metrics.of[m],
-                       study_metric_unit(m));
-            between = ", ";
-        }
-}
-
-static void optimize_put_values(const OptimumValues *values, Bytes *json) {
-    for (size_t i = 0; i < values->count; i++)
-        bytes_json(json, "%s: %p, ", values->at[i].member.pointer, values->at[i].value);
-}
-
-// The metrics side by side; the front and the rivals with a column for each variable.
-static void optimize_add(const Variant *answer, Bytes *json) {
-    const Optimum *optimum = (const Optimum *)(const void *)answer;
-    bytes_text(json, ", \"gain\": [");
-    optimize_put_metrics(optimum, json);
-    bytes_text(json, "], \"best of both\": [");
-    for (size_t i = 0; i < optimum->front.count; i++) {
-        const OptimumCandidate *candidate = &optimum->front.at[i];
-        bytes_text(json, i > 0 ? ", {" : "{");
-        optimize_put_values(&candidate->values, json);
-        for (size_t k = 0; k < 2; k++)
-            bytes_json(json, "%p%s: %g", k > 0 ? ", " : "",
-                       study_metric_names[optimum->objectives.at[k].metric],
-                       candidate->objectives.at[k]);
-        bytes_text(json, "}");
-    }
-    bytes_text(json, "], \"nearly as good\": [");
-    for (size_t i = 0; i < optimum->rivals.count; i++) {
-        const OptimumRival *rival = &optimum->rivals.at[i];
-        bytes_text(json, i > 0 ? ", {" : "{");
-        optimize_put_values(&rival->values, json);
-        bytes_json(json, "\"difference\": %g, \"interval_95\": [", rival->difference);
-        bytes_reals(json, rival->interval_95.at, rival->interval_95.count);
-        bytes_text(json, "]}");
-    }
-    bytes_text(json, "]");
-}
-
 const Command command_optimize = {
-    STUDY_COMMAND("optimize", &study_optimize, NULL, optimize_add),
+    STUDY_COMMAND("optimize", &study_optimize, NULL),
     .summary = "values of members of a scene that make a metric best, under constraints",
     .help =
         DESIGN_HELP("optimize", "",
@@ -824,18 +755,10 @@ const Command command_optimize = {
                     "\"to\": 0.03}],\n"
                     "    \"over\": {\"runs\": 64}"),
     .options = study_fields,
-    .view = &optimize_view,
 };
 
-static const PrintTableView calibrate_view = {
-    .skipped = (const char *const[]){"kind", "history", "motions", "correlation", NULL},
-    .lists = (const PrintTableColumns[]){
-        {"parameters",
-         {"pointer", "value", "unit", "standard_error", "interval_95", "identifiable"}},
-        {NULL, {NULL}}}};
-
 const Command command_calibrate = {
-    STUDY_COMMAND("calibrate", &study_calibrate, NULL, NULL),
+    STUDY_COMMAND("calibrate", &study_calibrate, NULL),
     .summary = "fit parameters of a scene to measured motions",
     .help = DESIGN_HELP("calibrate", "", "the parameters with their intervals, and the verdict",
                         "\"parameters\":\n"
@@ -844,38 +767,20 @@ const Command command_calibrate = {
                         "    \"measured\": [{\"channel\": \"displacement\", \"interval\": 0.01, "
                         "\"samples\": [...]}]"),
     .options = study_fields,
-    .view = &calibrate_view,
 };
 
-static const PrintTableView response_view = {
-    .skipped = (const char *const[]){"kind", "multipliers", "section", NULL},
-    .lists = (const PrintTableColumns[]){
-        {"points",
-         {"value", "direction", "branch", "period", "impacts_per_period", "stable",
-          "peak_displacement", "undamped_peak_displacement", "lyapunov"}},
-        {NULL, {NULL}}}};
-
 const Command command_response = {
-    STUDY_COMMAND("response", &study_response, NULL, NULL),
+    STUDY_COMMAND("response", &study_response, NULL),
     .summary = "steady motion under a sine while a number varies: periodic orbits, stability",
     .help = DESIGN_HELP("response", "", "the curve as a table; the scene's excitation is a sine",
                         "\"direction\": \"both\", \"axis\":\n"
                         "    {\"pointer\": \"/excitation/frequency\", \"from\": 3, \"to\": 5, "
                         "\"count\": 81}"),
     .options = study_fields,
-    .view = &response_view,
 };
 
-static const PrintTableView fragility_view = {
-    .skipped = (const char *const[]){"kind", "curves", "fractiles", NULL},
-    .lists =
-        (const PrintTableColumns[]){{"limits",
-                                     {"metric", "value", "exceeded", "median", "median_interval_95",
-                                      "dispersion", "dispersion_interval_95"}},
-                                    {NULL, {NULL}}}};
-
 const Command command_fragility = {
-    STUDY_COMMAND("fragility", &study_fragility, NULL, NULL),
+    STUDY_COMMAND("fragility", &study_fragility, NULL),
     .summary = "probability of exceeding limits under ground motions of rising intensity",
     .help = DESIGN_HELP("fragility", " --record a.AT2 --record b.AT2",
                         "the limits' medians and dispersions; the scene names the files without "
@@ -884,5 +789,4 @@ const Command command_fragility = {
                         "    \"levels\": {\"from\": 0.5, \"to\": 10, \"count\": 20},\n"
                         "    \"limits\": [{\"metric\": \"peak_displacement\", \"value\": 0.02}]"),
     .options = study_fields,
-    .view = &fragility_view,
 };

@@ -310,6 +310,33 @@ static void text_put_axis(const TextCanvas *canvas, size_t margin, const TextLab
     bytes_clear(&below);
 }
 
+// The legends that fit, behind the heading of `used` characters or else on a line of their own.
+static void text_put_legend(const TextCanvas *canvas, size_t used, Bytes *bytes) {
+    const ChartPanel *panel = canvas->panel;
+    size_t total = used;
+    for (size_t i = 0; i < panel->count; i++)
+        total += panel->series[i].legend != NULL ? text_width(panel->series[i].legend) + 4 : 0;
+    if (panel->count > 1 && total > canvas->form->columns) {
+        bytes_text(bytes, "\n");
+        used = 0;
+    }
+    for (size_t i = 0; i < panel->count && panel->count > 1; i++) {
+        const ChartSeries *series = &panel->series[i];
+        const size_t width = series->legend != NULL ? text_width(series->legend) + 4 : 0;
+        if (width == 0 || used + width > canvas->form->columns)
+            continue;
+        bytes_text(bytes, "  ");
+        text_paint(canvas->form, text_colour(series), bytes);
+        bytes_text(bytes, series->kind == CHART_MARKERS ? text_glyph(canvas, series->shape)
+                          : canvas->form->is_utf8       ? "\u2500"
+                                                        : "-");
+        text_paint(canvas->form, 0, bytes);
+        bytes_format(bytes, " %s", series->legend);
+        used += width;
+    }
+    bytes_text(bytes, "\n");
+}
+
 // What the panel shows, and over what.
 static void text_put_heading(const Chart *chart, const TextCanvas *canvas, Bytes *bytes) {
     const ChartPanel *panel = canvas->panel, *titled = panel;
@@ -325,29 +352,9 @@ static void text_put_heading(const Chart *chart, const TextCanvas *canvas, Bytes
     text_fit(fitted,
              canvas->form->columns + 1 < sizeof fitted ? canvas->form->columns + 1 : sizeof fitted,
              text);
-    bytes_format(bytes, "%s%s%s\n", canvas->form->has_colour ? "\033[1m" : "", fitted,
+    bytes_format(bytes, "%s%s%s", canvas->form->has_colour ? "\033[1m" : "", fitted,
                  canvas->form->has_colour ? "\033[0m" : "");
-}
-
-// The legends that fit on one line.
-static void text_put_legend(const TextCanvas *canvas, size_t margin, Bytes *bytes) {
-    const ChartPanel *panel = canvas->panel;
-    size_t used = margin + 2, shown = 0;
-    for (size_t i = 0; i < panel->count; i++) {
-        const ChartSeries *series = &panel->series[i];
-        const size_t width = series->legend != NULL ? text_width(series->legend) + 4 : 0;
-        if (width == 0 || panel->count < 2 || used + width > canvas->form->columns)
-            continue;
-        text_repeat(bytes, " ", shown++ == 0 ? used : 2);
-        text_paint(canvas->form, text_colour(series), bytes);
-        bytes_text(bytes, series->kind == CHART_MARKERS ? text_glyph(canvas, series->shape)
-                          : canvas->form->is_utf8       ? "\u2500"
-                                                        : "-");
-        text_paint(canvas->form, 0, bytes);
-        bytes_format(bytes, " %s", series->legend);
-        used += width;
-    }
-    bytes_text(bytes, shown > 0 ? "\n" : "");
+    text_put_legend(canvas, text_width(fitted), bytes);
 }
 
 void chart_write_text(Chart *chart, size_t index, const ChartText *form, Bytes *bytes) {
@@ -379,7 +386,6 @@ void chart_write_text(Chart *chart, size_t index, const ChartText *form, Bytes *
             text_put_series(&canvas, &panel->series[i]);
     text_put_rows(&canvas, &y, bytes);
     text_put_axis(&canvas, y.width, &x, bytes);
-    text_put_legend(&canvas, y.width, bytes);
     if (panel->count > 0 && panel->series[0].kind == CHART_MAP && range[0] <= range[1]) {
         text_repeat(bytes, " ", y.width + 2);
         for (size_t i = 0; i < COUNT(text_map_colours); i++) {

@@ -58,16 +58,16 @@ def test_the_best_scene_is_one_request_away_and_has_the_reported_numbers():
 def test_the_command_prints_the_gain_and_the_values_of_rivals_and_front():
     """What people see names every variable of the best, of its rivals and of the front, and the region."""
     seeds = {**program.scene("paper_random_sponge"), "duration": 2, "study": {**asked()["study"], "over": {"runs": 8}}}
-    code, out, errors = program.run("optimize", "-", text=json.dumps(seeds))
-    assert code == 0, errors
+    code, out = program.on_terminal("optimize", scene=seeds)
+    assert code == 0, out
     blocks = {block.splitlines()[0]: block.splitlines()[1:] for block in out.split("\n\n")}
-    assert blocks["nearly as good"][0].split()[:3] == ["/dampers/0/clearance", "/dampers/0/buffer", "difference"], out
-    assert 0.005 <= float(blocks["nearly as good"][1].split()[0]) <= 0.04, out
-    assert [line.split()[0] for line in blocks["region"]] == ["pointer", "/dampers/0/clearance", "/dampers/0/buffer"], out
-    assert blocks["gain"][0].split() == ["metric", "best", "given", "undamped", "unit"], out
+    assert blocks["Nearly as good"][0].split()[:2] == ["values", "difference"], out
+    assert 0.005 <= float(blocks["Nearly as good"][1].split(",")[0]) <= 0.04, out
+    assert [line.split()[0] for line in blocks["Best values"]] == ["variable", "/dampers/0/clearance", "/dampers/0/buffer"], out
+    assert blocks["Gain"][0].split()[:2] == ["quantity", "best"], out
     seeds["study"]["objectives"].append({"metric": "peak_contact_force"})
-    code, out, errors = program.run("optimize", "-", text=json.dumps(seeds))
-    assert code == 0 and "\nbest of both\n/dampers/0/clearance  /dampers/0/buffer  " in out, (out, errors)
+    code, out = program.on_terminal("optimize", scene=seeds)
+    assert code == 0 and "\nFront\nvalues " in out, out
 
 
 def test_two_objectives_and_constraints_that_none_keeps():

@@ -70,12 +70,12 @@ def check_chart(text, table):
     assert drawn == len(titles) > 3
 
 
-def test_the_command_prints_a_table_and_writes_table_and_chart():
-    """`tradeoff` prints every point aligned, with what to take; -o may be given again, for json and svg."""
+def test_the_command_writes_table_and_chart():
+    """`tradeoff` writes its files and, where its output is no terminal, prints nothing beside them."""
     with tempfile.TemporaryDirectory() as folder:
         paths = [os.path.join(folder, name) for name in ("out.json", "out.svg")]
         code, out, errors = program.run("tradeoff", SPONGE, *QUICK, "-o", paths[0], "-o", paths[1])
-        assert (code, errors) == (0, ""), (code, errors)
+        assert (code, out, errors) == (0, "", ""), (code, out, errors)
         assert sorted(os.listdir(folder)) == ["out.json", "out.svg"]
         with open(paths[0], encoding="utf-8") as file:
             table = json.load(file)
@@ -85,14 +85,6 @@ def test_the_command_prints_a_table_and_writes_table_and_chart():
     assert table["kind"] == "tradeoff" and table["repeats"] == 1 and table["error"] == 1e-3
     solvers = {point["solver"] for point in table["points"]}
     assert {"exact", "precise", "rk4", "newmark"} <= solvers, solvers
-    lines = out.splitlines()
-    assert any(line.startswith("error_estimate") and "1.68" in line for line in lines), lines
-    rows = [line for line in lines if any((line + "  ").startswith(point["name"] + "  ") for point in table["points"])]
-    assert len(rows) == len(table["points"]), rows
-    measured = [line for line in rows if line.endswith("  -")]
-    assert len(measured) == sum(point["status"] == "measured" for point in table["points"]), rows
-    assert len({len(line) for line in measured}) == 1 and len(measured[0]) <= 130, measured
-    assert table["recommendation"]["why"] in out
 
 
 def test_settings_are_the_studys():

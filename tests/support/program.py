@@ -5,11 +5,16 @@ documentation is the sentence it proves. Used by every tests/**/test_*.py."""
 
 import argparse
 import contextlib
+import fcntl
 import json
 import os
+import pty
 import re
+import struct
 import subprocess
 import sys
+import tempfile
+import termios
 import time
 import traceback
 
@@ -52,6 +57,28 @@ def run(*arguments, text="", timeout=120, environment=None):
     done = subprocess.run([impactd(), *arguments], input=text, capture_output=True, text=True,
                           timeout=timeout, env=environment or dict(os.environ), check=False)
     return done.returncode, done.stdout, done.stderr
+
+
+def on_terminal(*arguments, scene=None, columns=80, **environment):
+    """Runs impactd on a scene (a dict or a path) on a terminal; returns code and what is left there at its end."""
+    settings = {**os.environ, "TERM": "xterm-256color", "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "COLUMNS": "", **environment}
+    with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+        if isinstance(scene, dict):
+            json.dump(scene, file)
+            file.flush()
+        operands = [] if scene is None else [file.name if isinstance(scene, dict) else scene]
+        end, terminal = pty.openpty()
+        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
+        with subprocess.Popen([impactd(), *arguments, *operands], stdin=subprocess.DEVNULL, stdout=terminal,
+                              stderr=terminal, env=settings) as process:
+            os.close(terminal)
+            written = b""
+            with contextlib.suppress(OSError):  # the end of a terminal is an error
+                while piece := os.read(end, 65536):
+                    written += piece
+            os.close(end)
+    text = written.decode().replace("\r\n", "\n")
+    return process.returncode, re.sub(r"^.*\r(?:\033\[K|(?=[^\r\n]))", "", text, flags=re.M)
 
 
 def scene(name):
