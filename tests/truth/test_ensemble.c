@@ -23,7 +23,7 @@
 #include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
-static unsigned long scenes = 4;
+static unsigned long scenes = 2;
 static uint64_t seed = 1;
 static unsigned long runs_of_each = 0;
 static Problem problem;

@@ -20,7 +20,7 @@
 #include "tests/truth/extremes.h"
 #include "tests/truth/extremes_judge.h"
 
-static size_t scenes = 200;
+static size_t scenes = 100;
 static uint64_t seed = 1;
 static double most_seconds = 0.1;
 static FILE *rows;

@@ -13,7 +13,7 @@
 #include "tests/truth/drawn.h"
 #include "tests/truth/frame_reference.h"
 
-static size_t scenes = 8;
+static size_t scenes = 5;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 

@@ -9,7 +9,7 @@
 #include "tests/truth/drawn.h"
 #include "tests/truth/scan.h"
 
-static size_t scenes = 1000;
+static size_t scenes = 500;
 static uint64_t seed = 1;
 
 static void short_scene(ReferenceScene *scene, size_t i) {

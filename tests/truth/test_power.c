@@ -14,7 +14,7 @@
 #include "tests/truth/drawn.h"
 #include "tests/truth/power_reference.h"
 
-static size_t scenes = 24;
+static size_t scenes = 12;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 

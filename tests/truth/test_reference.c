@@ -11,7 +11,7 @@
 #include "tests/truth/drawn.h"
 #include "tests/truth/reference_compare.h"
 
-static size_t scenes = 30;
+static size_t scenes = 15;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 

@@ -14,7 +14,7 @@
 #include "tests/support/test.h"
 #include "tests/truth/drawn.h"
 
-static size_t scenes = 24;
+static size_t scenes = 12;
 static uint64_t seed = 1;
 static bool is_verbose = false;
 
