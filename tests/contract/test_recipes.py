@@ -264,6 +264,27 @@ for one in PAGES:
     globals()["test_" + os.path.basename(one)] = page_test(one)
 
 
+def slugs(path):
+    """The anchors of a page's headings, as GitHub makes them."""
+    with open(path, encoding="utf-8") as file:
+        text = re.sub(r"^ *```.*?^ *```$", "", file.read(), flags=re.M | re.S)
+    return {re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-") for title in re.findall(r"^#+ (.*)$", text, re.M)}
+
+
+def test_links_of_the_readme():
+    """Every relative link of README.md leads to a file, and to a heading of it; those of the guide are checked by the build."""
+    with open(os.path.join(program.SOURCE, "README.md"), encoding="utf-8") as file:
+        links = re.findall(r"\]\(([^)\s]+)\)", re.sub(r"^```.*?^```$", "", file.read(), flags=re.M | re.S))
+    for link in links:
+        if "://" in link:
+            continue
+        path, _, anchor = link.partition("#")
+        path = os.path.join(program.SOURCE, path or "README.md")
+        assert os.path.isfile(path), link
+        assert not anchor or anchor in slugs(path), link
+    assert len(links) > 10, links
+
+
 def test_a_fault_is_found_at_its_line():
     """A block that fails, hangs, prints something else or is no scene is reported with its line."""
     global MAX_SECONDS
