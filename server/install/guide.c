@@ -48,6 +48,7 @@ static struct {
     GuidePage *pages[GUIDE_PAGES];
     size_t page_count;
     size_t faults, missing;
+    Bytes order; // pages.txt
 } guide;
 
 __attribute__((format(printf, 2, 3))) static void guide_fault(const GuidePage *page,
@@ -151,12 +152,18 @@ static void pages_add(const char *name, const char *group) {
     guide.pages[guide.page_count++] = page;
 }
 
+// Whether a page is in the order, written or not.
+static bool pages_have_planned(const char *name) {
+    char line[GUIDE_NAME + 2];
+    snprintf(line, sizeof line, "\n%s\n", name);
+    return strstr(bytes_string(&guide.order), line) != NULL;
+}
+
 static void pages_read_order(void) {
-    static Bytes text;
     char group[GUIDE_NAME] = "";
-    if (!guide_read(guide.folder, "pages", ".txt", &text))
+    if (!guide_read(guide.folder, "pages", ".txt", &guide.order))
         guide_fault(NULL, "pages.txt cannot be read");
-    for (const char *line = bytes_string(&text); *line != '\0';) {
+    for (const char *line = bytes_string(&guide.order); *line != '\0';) {
         const size_t length = strcspn(line, "\n");
         char name[GUIDE_NAME];
         snprintf(name, sizeof name, "%.*s", (int)length, line);
@@ -245,6 +252,22 @@ static void page_add_heading(GuidePage *page, cmark_node *node) {
     page->headings[page->heading_count++] = heading;
 }
 
+// A link to a file of the sources is followed in the repository; on the server it is plain text.
+static bool link_is_source(cmark_node *node) {
+    return strncmp(cmark_node_get_url(node), "../../", 6) == 0;
+}
+
+static void page_unwrap_link(const GuidePage *page, cmark_node *node) {
+    char path[GUIDE_PATH];
+    const char *url = cmark_node_get_url(node);
+    snprintf(path, sizeof path, "%s/%.*s", guide.folder, (int)strcspn(url, "#"), url);
+    if (access(path, R_OK) != 0)
+        guide_fault(page, "the link %s leads to no file", url);
+    for (cmark_node *child; (child = cmark_node_first_child(node)) != NULL;)
+        cmark_node_insert_before(node, child);
+    cmark_node_free(node);
+}
+
 // A link to a page of the guide gets its address on the server.
 static void page_add_link(GuidePage *page, cmark_node *node) {
     const char *url = cmark_node_get_url(node);
@@ -252,10 +275,10 @@ static void page_add_link(GuidePage *page, cmark_node *node) {
     const size_t length = strcspn(url, "#");
     const bool is_page = length > 3 && strncmp(url + length - 3, ".md", 3) == 0;
     // "../openapi.json" is of the server; tests ask it for every such link.
-    if ((colon != NULL && colon < url + length) ||
-        (strncmp(url, "../", 3) == 0 && !is_page && strncmp(url + 3, "../", 3) != 0))
+    if ((colon != NULL && colon < url + length) || (strncmp(url, "../", 3) == 0 && !is_page))
         return;
-    if (!(is_page || length == 0) || page->link_count == GUIDE_HEADINGS) {
+    if (!(is_page || length == 0) || memchr(url, '/', length) != NULL ||
+        page->link_count == GUIDE_HEADINGS) {
         guide_fault(page, "the link %s leads to no page of the guide", url);
         return;
     }
@@ -281,10 +304,8 @@ static void page_check_picture(const GuidePage *page, cmark_node *node) {
     node_text(node, &description);
     const char *url = cmark_node_get_url(node);
     snprintf(path, sizeof path, "%s/%s", guide.folder, url);
-    if (strchr(url, '/') != NULL)
+    if (strchr(url, '/') != NULL || access(path, R_OK) != 0)
         guide_fault(page, "the picture %s is not in this folder", url);
-    else
-        guide.missing += access(path, R_OK) != 0;
     if (description.count == 0)
         guide_fault(page, "the picture %s has no description", url);
     bytes_clear(&description);
@@ -295,7 +316,10 @@ static void page_walk(GuidePage *page, cmark_node *document) {
     for (cmark_event_type event; (event = cmark_iter_next(iterator)) != CMARK_EVENT_DONE;) {
         cmark_node *node = cmark_iter_get_node(iterator);
         const cmark_node_type type = cmark_node_get_type(node);
-        if (event != CMARK_EVENT_ENTER)
+        const bool is_source = type == CMARK_NODE_LINK && link_is_source(node);
+        if (event == CMARK_EVENT_EXIT && is_source)
+            page_unwrap_link(page, node);
+        if (event == CMARK_EVENT_EXIT || is_source)
             continue;
         if (type == CMARK_NODE_HEADING && cmark_node_parent(node) != document)
             guide_fault(page, "a heading within another block");
@@ -389,7 +413,9 @@ static void page_check_links(const GuidePage *page) {
     for (size_t i = 0; i < page->link_count; i++) {
         const GuideLink *link = &page->links[i];
         const GuidePage *target = page_find(link->page);
-        if (target == NULL)
+        if (target == NULL && !pages_have_planned(link->page))
+            guide_fault(page, "links to %s.md, which is not in pages.txt", link->page);
+        else if (target == NULL)
             guide.missing++;
         else if (link->anchor[0] != '\0' && heading_find(target, link->anchor) == NULL)
             guide_fault(page, "%s.md has no heading with the anchor #%s", link->page, link->anchor);
@@ -521,7 +547,6 @@ int main(int argc, char **argv) {
     if (guide.faults == 0)
         search_write();
     if (guide.missing > 0)
-        fprintf(stderr, "%s: %zu pages, links to them and pictures are missing\n", argv[1],
-                guide.missing);
+        fprintf(stderr, "%s: %zu pages and links to them are missing\n", argv[1], guide.missing);
     return guide.faults > 0 ? 1 : 0;
 }

@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 
 WEB = os.path.join(program.SOURCE, "web")
-MOST_BYTES = 205_000  # of all but vendor/
+MOST_BYTES = 207_000  # of all but vendor/
 MOST_LINES = 400
 
 TYPES = {".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",

@@ -5,7 +5,7 @@ import { themed } from "../web/js/theme.js";
 
 const MOST = 12, EXCERPT = 130; // results; characters before and after a word
 const at = (id) => document.getElementById(id);
-themed(at("theme"));
+themed(at("guide-theme"));
 
 // Code: of a console only what is typed, without its prompts.
 for (const block of document.querySelectorAll("main pre")) {
@@ -22,7 +22,7 @@ for (const block of document.querySelectorAll("main pre")) {
 }
 
 // The heading that is read is marked in the list of headings.
-const entries = new Map([...document.querySelectorAll("#contents a")].map((link) => [decodeURIComponent(link.hash.slice(1)), link]));
+const entries = new Map([...document.querySelectorAll("#guide-contents a")].map((link) => [decodeURIComponent(link.hash.slice(1)), link]));
 const headings = [...entries.keys()].map(at).filter(Boolean);
 function mark() {
   const read = headings.findLast((heading) => heading.getBoundingClientRect().top < 120);
@@ -30,13 +30,13 @@ function mark() {
 }
 addEventListener("scroll", () => requestAnimationFrame(mark), { passive: true });
 mark();
-for (const list of [at("pages"), at("contents")])
+for (const list of [at("guide-pages"), at("guide-contents")])
   list.addEventListener("click", (event) => event.target.closest("a") && list.matches(":popover-open") && list.hidePopover());
 
 // The search. The index is read when the field gets the focus: [[page, title, [[anchor, heading, text] ...]] ...].
-const words = at("words"), found = at("found");
+const words = at("guide-words"), found = at("guide-found");
 let index = null, chosen = -1;
-at("search").hidden = false;
+at("guide-search").hidden = false;
 
 const plain = (text) => text.toLowerCase();
 async function read() {
@@ -89,7 +89,7 @@ async function search() {
   if (plain(words.value).split(/\s+/).filter(Boolean).join(" ") !== wanted.join(" ")) return; // typed meanwhile
   const best = (sections ?? []).map((section) => ({ section, points: score(section, wanted) })).filter(({ points }) => points > 0)
     .sort((a, b) => b.points - a.points).slice(0, MOST);
-  fill(found, best.map(({ section }, i) => h("a", { role: "option", id: `found-${i}`, href: section.href, tabindex: "-1", onclick: close },
+  fill(found, best.map(({ section }, i) => h("a", { role: "option", id: `guide-found-${i}`, href: section.href, tabindex: "-1", onclick: close },
     h("b", null, section.anchor ? [h("span.quiet", null, `${section.title} › `)] : [], marked(section.heading, wanted)),
     marked(excerpt(section, wanted), wanted))),
     best.length === 0 && h("p", null, sections ? `Nothing has ${words.value.trim()}.` : "The index cannot be read; is the daemon running?"));
@@ -113,4 +113,4 @@ addEventListener("keydown", (event) => {
   words.focus();
   words.select();
 });
-addEventListener("click", (event) => !at("search").contains(event.target) && close());
+addEventListener("click", (event) => !at("guide-search").contains(event.target) && close());

@@ -2,7 +2,7 @@
 import { go, link, note, read, swap } from "./address.js";
 import { get, schema } from "./api.js";
 import { differing, numbers, partings, spectra } from "./compare_view.js";
-import { faults, fill, h, hint, panel } from "./dom.js";
+import { faults, fill, h, help, hint, panel } from "./dom.js";
 import { plot } from "./plot.js";
 import { place, unitOf } from "./scene_form.js";
 import { extent, latest, lesson, told } from "./study_bits.js";
@@ -16,7 +16,7 @@ export const page = {
   show(host, { query }) {
     const ids = idsOf(query), chooser = h("form.panel"), body = h("div", null, "Loading …");
     let motion = null;
-    fill(host, h("h1", null, "Compare"), chooser, body);
+    fill(host, help("Compare"), h("h1", null, "Compare"), chooser, body);
     async function load() {
       const names = await latest(100), [b, a] = names.keys();
       if (ids.length === 0 && a) return swap("compare", { a, b });

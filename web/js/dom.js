@@ -1,4 +1,6 @@
 // Elements from plain values: no page writes markup, text stays text.
+import { places } from "./help.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 
 function put(node, attributes, children) {
@@ -109,7 +111,11 @@ export function table(caption, columns, rows, { sort = false } = {}) {
     h("table", null, h("caption", null, caption), h("thead", null, h("tr", null, heads)), body));
 }
 
-export const panel = (name, ...children) => h("section.panel", { "aria-label": name }, h("h2", null, name), children);
+// A "?" that leads to the guide, where it has a place on what a heading names.
+export const help = (name, place = places[name]) => place && h("a.help", { href: `guide/${place.replace(/#|$/, ".html$&")}`,
+  "aria-label": `Guide: ${name}` }, "?");
+
+export const panel = (name, ...children) => h("section.panel", { "aria-label": name }, help(name), h("h2", null, name), children);
 
 // A quiet line of help.
 export const hint = (...children) => h("p.hint", null, children);

@@ -1,7 +1,7 @@
 // The runs, newest first: what became of each, and a way to stop those that go on.
 import { link, note, read } from "./address.js";
 import { ask, remove } from "./api.js";
-import { button, failure, fill, h, table, tell } from "./dom.js";
+import { button, failure, fill, h, help, table, tell } from "./dom.js";
 import { moment, quantity, title } from "./units.js";
 
 const STATES = { accepted: "Waiting", running: "Running", successful: "Done", failed: "Failed", dismissed: "Cancelled" };
@@ -23,7 +23,7 @@ export const page = {
     const search = h("form.row", { role: "search", oninput: choose, onsubmit: (event) => event.preventDefault() },
       h("label", null, "Title or label ", h("input", { name: "q", type: "search" })),
       h("label", null, "State ", choice("status", Object.keys(STATES))), h("label", null, "Study ", choice("kind", KINDS)));
-    fill(host, h("h1", null, "Runs"), search, list);
+    fill(host, help("Runs"), h("h1", null, "Runs"), search, list);
 
     function choose() {
       note({ ...Object.fromEntries(new FormData(search)), before: null });

@@ -1,7 +1,7 @@
 // All materials: found by words and ranges, added, brought in and out as files.
 import { go, link, swap } from "./address.js";
 import { get, post, save, schema } from "./api.js";
-import { button, faults, fill, folded, h, hint, table } from "./dom.js";
+import { button, faults, fill, folded, h, help, hint, table } from "./dom.js";
 import { schemaForm } from "./material_form.js";
 import { FIGURES, range, STATUS } from "./material_parts.js";
 
@@ -42,7 +42,7 @@ export const page = {
   show(host, { query }) {
     const list = h("div"), count = h("div.quiet", { role: "status" }, "Loading …");
     const exporting = ["materials.csv", "materials.json"].map((name) => button(`Export ${name}`, () => save(`v1/${name}`, name)));
-    fill(host, h("h1", null, "Materials"), h("p", null, "What a lab measured of its buffers."),
+    fill(host, help("Materials"), h("h1", null, "Materials"), h("p", null, "What a lab measured of its buffers."),
       h("div.panel", null, search(query), count, list), h("div.panel", null,
         folded("Add a material", adding), folded("Import", importing), h("div.row", null, exporting)));
     get("v1/materials", { ...query, limit: MOST }).then(({ materials }) => {

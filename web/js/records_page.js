@@ -1,7 +1,7 @@
 // The ground motions that the daemon keeps: listed, and new ones uploaded.
 import { go, link } from "./address.js";
 import { get, post } from "./api.js";
-import { faults, fill, h, hint, panel, table } from "./dom.js";
+import { faults, fill, h, help, hint, panel, table } from "./dom.js";
 import { frame } from "./fields.js";
 import { schemaForm } from "./material_form.js";
 import { told } from "./record_page.js";
@@ -39,7 +39,7 @@ export const page = {
   title: () => "Ground motions",
   async show(host) {
     const list = h("div", null, "Loading …");
-    fill(host, h("h1", null, "Ground motions"), h("p", null, "Records that shake the base of a scene; one never changes."), list,
+    fill(host, help("Ground motions"), h("h1", null, "Ground motions"), h("p", null, "Records that shake the base of a scene; one never changes."), list,
       panel("Upload one", await schemaForm(UPLOAD, {}, "Upload", upload,
         { widgets: [[/^.file$/, chooser]], shows: (pointer) => /unit|interval/.test(pointer) })));
     get("v1/records", { limit: MOST }).then(({ records }) => fill(list,

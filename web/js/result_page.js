@@ -1,7 +1,7 @@
 // A result by its URL: views of it that share one window of time; of a study the view of its kind, with the scene's run below.
 import { note, read } from "./address.js";
 import { get } from "./api.js";
-import { failure, fill, folded, h, notice, panel } from "./dom.js";
+import { failure, fill, folded, h, help, notice, panel } from "./dom.js";
 import { Ledger } from "./ledger.js";
 import { sceneLink } from "./study_bits.js";
 import { section as animation } from "./animation.js";
@@ -23,7 +23,7 @@ const DESIGN = ["optimize", "calibrate", "response", "fragility"]; // share a vi
 async function showStudy(host, context) {
   const { scene, study: { kind } } = context.result, view = await import(`./${DESIGN.includes(kind) ? "design" : kind}_view.js`);
   const controller = await view.show(host, context);
-  host.append(h("p", null, sceneLink("Change the study", scene)));
+  host.append(h("p", null, sceneLink("Change the study", scene)), help("this study", `study-${kind}`));
   return controller;
 }
 

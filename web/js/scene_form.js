@@ -1,5 +1,5 @@
 // The scene's form in the steps that one thinks in.
-import { h } from "./dom.js";
+import { h, help } from "./dom.js";
 import { parts } from "./draft.js";
 import { choice } from "./fields.js";
 import { form } from "./form.js";
@@ -74,7 +74,7 @@ export function sceneForm(host, { schema, draft, widgets }) {
   };
   for (const members of steps) {
     const inner = h("div"), [name] = members, heading = h("h2", null, title(members.join(", ")));
-    host.append(h("details.panel", { open: name !== "output" }, h("summary", null, heading), inner));
+    host.append(h("details.panel", { open: name !== "output" }, h("summary", null, heading), help(title(name)), inner));
     form(inner, { ...options, ...members.length > 1 ? { schema, only: members }
       : { pointer: `/${name}`, schema: schema.properties[name], required: schema.required.includes(name) } });
   }

@@ -2,7 +2,7 @@
 import { accuracyWidget } from "./accuracy.js";
 import { go } from "./address.js";
 import { check, schema, submit } from "./api.js";
-import { button, failure, faults, fill, h, once, panel } from "./dom.js";
+import { button, failure, faults, fill, h, help, once, panel } from "./dom.js";
 import { makeDraft } from "./draft.js";
 import { drawing } from "./drawing.js";
 import { examplesDialog } from "./examples.js";
@@ -39,7 +39,7 @@ async function show(host, address, signal) {
   const steps = h("div", null, "The form is on its way …"), drawn = h("div.panel.drawn");
   const told = h("div"), state = h("p.hint", { role: "status" }), comes = h("div");
   const run = button("Run", () => runScene(), { class: "primary run", title: "Ctrl + Enter", "aria-keyshortcuts": "Control+Enter" });
-  fill(host, h("h1", null, "Scene"),
+  fill(host, help("Scene"), h("h1", null, "Scene"),
     h("p", null, "A free mass between two buffered stops in a structure: change what you like. ",
       button("Examples", examplesDialog)), told,
     h("div.scene", null, h("div", null, steps), h("div.beside", null, drawn,
