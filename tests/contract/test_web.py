@@ -78,7 +78,7 @@ def faults(path, source):
 
 
 def test_the_dashboard_is_small():
-    """All files of web/ without the vendored library are under 205,000 bytes, as they stand."""
+    """All files of web/ without the vendored library are under 207,000 bytes, as they stand."""
     sizes = {path: os.path.getsize(os.path.join(WEB, path)) for path in own_files() if embedded(path)}
     largest = sorted(sizes.items(), key=lambda one: -one[1])[:12]
     assert sum(sizes.values()) < MOST_BYTES, f"{sum(sizes.values())} bytes; the largest: {largest}"
