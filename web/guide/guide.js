@@ -39,16 +39,20 @@ let index = null, chosen = -1;
 at("guide-search").hidden = false;
 
 const plain = (text) => text.toLowerCase();
+// "authentication" finds "authenticate": long words are looked for without their ending.
+const stem = (word) => word.replace(/^(.{4,}?)(ations?|ions?|ing|ed|es|s|e)$/, "$1");
+const asked = () => plain(words.value).split(/\s+/).filter(Boolean).map(stem);
 async function read() {
   index ??= get("search.json").then((pages) => pages.flatMap(([page, title, sections]) => sections.map(([anchor, heading, text]) =>
-    ({ href: `${page === "index" ? "./" : `${page}.html`}${anchor && `#${anchor}`}`, title, heading, text, anchor,
+    ({ weight: page === "api" ? 0.7 : 1, href: `${page === "index" ? "./" : `${page}.html`}${anchor && `#${anchor}`}`, title, heading, text, anchor,
       low: { title: plain(title), heading: plain(heading), text: plain(text) } }))));
   index.catch(() => (index = null));
   return index;
 }
 
-// How well a section fits all words, 0 where one is missing: a heading counts more than a title, and that more than the text.
-function score({ low, anchor }, wanted) {
+// How well a section fits all words, 0 where one is missing: a heading counts more than a title, and that more than
+// the text; the reference of the API counts less than other pages.
+function score({ low, anchor, weight }, wanted) {
   let sum = 0;
   for (const word of wanted) {
     const starts = (text) => text.startsWith(word) || text.includes(` ${word}`);
@@ -57,7 +61,7 @@ function score({ low, anchor }, wanted) {
     if (one === 0) return 0;
     sum += one;
   }
-  return sum + (low.heading.includes(wanted.join(" ")) ? 30 : low.text.includes(wanted.join(" ")) ? 6 : 0) + (anchor ? 0 : 5);
+  return weight * (sum + (low.heading.includes(wanted.join(" ")) ? 30 : low.text.includes(wanted.join(" ")) ? 6 : 0) + (anchor ? 0 : 5));
 }
 
 const escape = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
@@ -83,10 +87,10 @@ function close() {
 }
 
 async function search() {
-  const wanted = plain(words.value).split(/\s+/).filter(Boolean);
+  const wanted = asked();
   if (wanted.length === 0) return close();
   const sections = await read().catch(() => null);
-  if (plain(words.value).split(/\s+/).filter(Boolean).join(" ") !== wanted.join(" ")) return; // typed meanwhile
+  if (asked().join(" ") !== wanted.join(" ")) return; // typed meanwhile
   const best = (sections ?? []).map((section) => ({ section, points: score(section, wanted) })).filter(({ points }) => points > 0)
     .sort((a, b) => b.points - a.points).slice(0, MOST);
   fill(found, best.map(({ section }, i) => h("a", { role: "option", id: `guide-found-${i}`, href: section.href, tabindex: "-1", onclick: close },
