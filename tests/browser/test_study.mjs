@@ -38,7 +38,7 @@ test("A study's chart opened by itself has its colours, light and dark", async (
 test("Below a study stands the scene's own run", async ({ page, daemon, url }) => {
   await open(page, daemon, url, "compare_sponge");
   assert.equal(await page.getByRole("region", { name: "Summary" }).count(), 0);
-  await page.getByText("The run of the scene as it stands").click();
+  await page.getByText("The run of the unchanged scene").click();
   await says(page.getByRole("region", { name: "Summary" }), /Impacts\s+22[^]*10 s of motion, 22 contacts and 10001 samples\./);
   await says(page.getByRole("region", { name: "Motion over time" }), /no peak is lost/);
 });
