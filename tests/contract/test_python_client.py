@@ -2,8 +2,10 @@
 """web/client/impactd.py as Python users meet it: installed by pip from a daemon, with and without NumPy, pandas and Matplotlib."""
 
 import contextlib
+import io
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -17,9 +19,9 @@ import pandas
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import token  # noqa: E402
+from access import token, until  # noqa: E402
 from asking import endless  # noqa: E402
-from client import fake, say  # noqa: E402
+from client import fake, raw, say  # noqa: E402
 
 sys.path.insert(0, os.path.join(program.SOURCE, "web", "client"))
 sys.dont_write_bytecode = True
@@ -184,6 +186,283 @@ def test_problems_have_all_their_places():
     gone = raised(ConnectionError, impactd.connect, lab.url)
     assert "impactd serve" in str(gone) and lab.url in str(gone)
 
+
+def test_every_study_has_a_table_and_a_best_row():
+    """All nine studies by their short forms: a table with units, a chart, best() and best_scene() where there is one."""
+    with laboratory() as lab:
+        s = lab.sweep(short(), {CLEARANCE: numpy.linspace(0.005, 0.025, 3), "dampers.0.buffer": ["sponge", "aluminium"]},
+                      metrics=["rms_displacement", "impacts"])
+        assert len(s.table) == 6 and s.table_units[CLEARANCE] == "m" and list(s.table["dampers.0.buffer"])[:2] == ["sponge@1", "aluminium@1"]
+        assert s.best()["rms_displacement"] == min(s.frame["rms_displacement"]) and s.best("impacts", "maximize")["impacts"] == max(s.table["impacts"])
+        assert lab.run(s.best_scene()).summary["rms_displacement"] == s.best()["rms_displacement"]
+        with without("pandas", "numpy"):
+            assert isinstance(s.table, list) and s.table[0]["dampers.0.buffer"] == "sponge@1" and "pip install pandas" in str(raised(ImportError, lambda: s.frame))
+        raised(KeyError, s.best, "rms_displacment")
+        tied = lab.sweep(short(dampers=[{"mass": 0.1, "clearance": 0.01, "left_buffer": "sponge", "right_buffer": "sponge"}]),
+                         {("dampers.0.left_buffer", "dampers.0.right_buffer"): ["sponge", "hard_rubber"]})
+        assert len(tied.table) == 2 and tied.scene["study"]["axes"][0]["pointers"] == ["/dampers/0/left_buffer", "/dampers/0/right_buffer"]
+        e = lab.ensemble("paper_random_sponge", runs=4, duration=2)
+        assert list(e.table["seed"]) == [1, 2, 3, 4] and e.answer["statistics"] and e.scene["duration"] == 2
+        drawn = lab.ensemble(short(), 4, {CLEARANCE: {"distribution": "uniform", "from": 0.01, "to": 0.02}})
+        assert drawn.table[CLEARANCE].between(0.01, 0.02).all()
+        o = lab.optimize(short(), {CLEARANCE: (0.002, 0.06)}, "rms_displacement", {"peak_contact_force": (None, 100)}, max_candidates=8)
+        assert len(o.table) == 8 and o.best()["feasible"] and 0.002 <= o.best()[CLEARANCE] <= 0.06
+        assert lab.run(o.best_scene()).summary["rms_displacement"] == o.best()["rms_displacement"]
+        most = lab.optimize(short(), {CLEARANCE: [0.01, 0.02]}, {"impacts": "maximize"})
+        assert most.best()["impacts"] == max(most.table["impacts"])
+        never = lab.optimize(short(), {CLEARANCE: [0.01, 0.02]}, "impacts", {"peak_displacement": (1, None)})
+        assert "peak_displacement" in str(refused(never.best))
+        motion = lab.run(short())
+        c = lab.calibrate(short(), {"dampers.0.buffer.restitution": (0.3, 0.9)},
+                          [{"channel": "displacement", "samples": motion.displacement, "interval": 0.001}], starts=2,
+                          **{"dampers.0.buffer": {"restitution": 0.5, "contact_time": 0.025}})
+        assert abs(c.best()["dampers.0.buffer.restitution"] - 0.61) < 1e-3 and len(c.table) == 1
+        r = lab.response("response_sponge", {"excitation.frequency": (3, 5, 3)}, direction="up", settle_cycles=20)
+        assert list(r.table["value"]) == [3, 4, 5]
+        lab.upload("shake", numpy.sin(numpy.arange(100)), interval=0.02, source="a test", processing="none")
+        still = {name: value for name, value in short("no_damper").items() if name != "excitation"}
+        f = lab.fragility(still, ["shake"], (1, 2, 2), {"peak_displacement": 0.01})
+        assert list(f.table["level"]) == [1, 2] and f.answer["limits"][0]["value"] == 0.01
+        m = lab.compare(short(), ["impulse", "spring_damper"])
+        n = lab.sensitivity(short(), parameters=["clearance"])
+        t = lab.tradeoff(short(), solvers=["exact", "rk4"])
+        assert list(m.table["model"]) == ["spring_damper", "impulse"] and "rk4" in list(t.table["solver"]) and len(n.table)
+        for study in (s, e, drawn, o, c, r, f, m, n, t):
+            assert "data:image/svg+xml" in study._repr_html_() and study.summary and study.kind in study.document["scene"]["study"]["kind"]
+        assert len(s.plot("rms_displacement").axes) == 1 and r.plot().axes
+        again = lab.result(s.id[:12])
+        assert isinstance(again, impactd.Study) and again.best() == s.best()
+
+
+def test_many_jobs_are_submitted_and_gathered():
+    """60 scenes through a queue that takes 8: each once, in order or as they finish, with progress; faults by their place."""
+    with laboratory("--queue", "8") as lab:
+        seeds = range(60)
+        scenes = [lab.scene("paper_random_sponge", **{"excitation.seed": seed + 1}, duration=2) for seed in seeds]
+        steps = []
+        found = list(lab.gather(lab.submit(scenes), ordered=True, progress=lambda done, total: steps.append((done, total))))
+        assert [r.scene["excitation"]["seed"] for r in found[:3] + found[-1:]] == [1, 2, 3, 60]
+        assert len({r.id for r in found}) == 60 and steps[-1] == (60, 60) and len(steps) == 60
+        assert {r.id for r in lab.gather(scenes[:5])} == {r.id for r in found[:5]}
+        assert len(lab.jobs(limit=None)) == 65 and len(lab.jobs(limit=10)) == 10  # no job twice, and pages
+        problem = refused(lab.submit, scenes[:2] + [{"structure": {"mass": -1}}])
+        assert problem.title.startswith("Item 2 of the list") and problem.faults, problem
+        unstable = {**program.scene("paper_free_aluminium"), "duration": 1, "accuracy": {"solver": "rk4", "step": 0.001}}
+        mixed = list(lab.gather(lab.submit([scenes[0], unstable]), ordered=True, errors="return"))
+        assert mixed[0].id == found[0].id and isinstance(mixed[1], impactd.Problem)
+        refused(list, lab.gather(lab.submit([unstable])))
+
+
+def test_jobs_can_be_waited_for_and_cancelled():
+    """A timeout leaves the job, cancel ends it, and a loop over gather that is left early cancels where that was asked for."""
+    with laboratory() as lab:
+        raised(TimeoutError, lambda: lab.run(endless(1), timeout=0.1))
+        jobs = lab.submit([endless(2), endless(3), program.scene("paper_free_sponge")])
+        for r in lab.gather(jobs, cancel=True):
+            assert r.summary["impacts"] == 22
+            break
+        states = {job.refresh().status for job in jobs}
+        assert states == {"dismissed", "successful"}, states
+        job = next(lab.job(one) for one in lab.jobs(status="running")["id"])
+        assert job.cancel().status == "dismissed" and job.cancel().status == "dismissed"
+        assert refused(job.result).job is job
+
+
+def test_interrupts_cancel_where_that_was_asked_for():
+    """Ctrl-C in run ends the job on the server with cancel_on_interrupt=True."""
+    with program.daemon() as daemon:
+        code = ("import impactd, json, sys; lab = impactd.connect(cancel_on_interrupt=True)\n"
+                "print('ready', flush=True); lab.run(json.load(sys.stdin))")
+        process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   env={**os.environ, "PYTHONPATH": os.path.dirname(impactd.__file__), "IMPACTD_SERVER": daemon.url})
+        assert process.stdout.readline() == "ready\n"
+        process.stdin.write(json.dumps(endless()))
+        process.stdin.close()
+        assert until(lambda: daemon.get("/v1/jobs").json()["jobs"])
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) != 0 and "KeyboardInterrupt" in process.stderr.read()
+        process.stdout.close()
+        process.stderr.close()
+        assert until(lambda: daemon.get("/v1/jobs").json()["jobs"][0]["status"] == "dismissed")
+
+
+def test_requests_are_repeated_where_that_is_safe():
+    """429 and 503 with Retry-After and broken connections are repeated, a POST only under its key; other refusals are not."""
+    version, job = say(body=b'{"version": "x"}'), say(body=b'{"id": "j-1", "status": "successful", "progress": 100, "study": null, "result": "r-1"}')
+
+    def busy(code):
+        return say(code, b'{"title": "busy", "status": %d}' % code, "application/problem+json", Retry_After="0")
+
+    with fake(version, raw(b""), busy(503), busy(429), job) as (url, seen):
+        lab = impactd.connect(url, token="t", timeout=5)
+        lab.submit({})
+        assert [line[0] for line in seen] == ["GET"] + ["POST"] * 4
+        assert len({line[2]["Idempotency-Key"] for line in seen[1:]}) == 1 and seen[1][2]["Authorization"] == "Bearer t"
+    with fake(version, raw(b""), job) as (url, seen):
+        raised(ConnectionError, impactd.connect(url, timeout=5).add_material, "felt", "Felt")  # it could be there twice
+        assert len(seen) == 2
+    with fake(version, say(503, b"", Retry_After="3600"), job) as (url, seen):
+        assert refused(impactd.connect(url, patience=1).submit, {}).status == 503 and len(seen) == 2
+    with fake(version, say(404, b"<html>not here</html>", "text/html")) as (url, _):
+        assert "not here" in str(refused(impactd.connect(url).material, "sponge"))
+    with fake(say(body=b"{}")) as (url, seen):
+        lab = impactd.connect(url + "/base/")
+        lab.request("GET", "/v1/cache")
+        lab.request("GET", "/base/v1/cache")
+        lab.request("GET", "http://elsewhere.example/base/v1/cache")  # a link never leads to another host
+        assert [line[1] for line in seen] == ["/base/version"] + ["/base/v1/cache"] * 3
+
+
+def test_one_client_serves_many_threads():
+    """Eight threads share a client: every answer is its own, and connections are reused."""
+    with laboratory() as lab:
+        wrong = []
+
+        def work(k):
+            for i in range(5):
+                r = lab.run(short(), **{CLEARANCE: 0.01 + 0.001 * k, "dampers.0.mass": 0.1 + 0.01 * i})
+                if r.scene["dampers"][0]["clearance"] != 0.01 + 0.001 * k or len(r.time) != 2001:
+                    wrong.append((k, i))
+
+        threads = [threading.Thread(target=work, args=(k,)) for k in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert not wrong and len(lab._http.idle) <= 8, (wrong, len(lab._http.idle))
+
+
+def test_materials_records_and_tokens():
+    """Materials are listed, added and measured, ground motions uploaded and read, jobs listed; a token is needed and may be too weak."""
+    with tempfile.TemporaryDirectory() as data:
+        writer, reader = token(data, "writer", "read,submit,materials"), token(data, "reader", "read")
+        with program.daemon(data=data) as daemon:
+            assert refused(impactd.connect(daemon.url).materials).status == 401
+            assert refused(impactd.connect(daemon.url, reader).run, "paper_free_sponge").status == 403
+            with unittest.mock.patch.dict(os.environ, {"IMPACTD_SERVER": daemon.url, "IMPACTD_TOKEN": writer}):
+                lab = impactd.connect()
+            materials = lab.materials().set_index("slug")
+            assert materials.loc["sponge", "contact_time"] == 0.025 and lab.material("sponge@1")["restitution"] == 0.61
+            lab.add_material("felt", "Felt, 5 mm", restitution=0.31, contact_time=0.0042, source="own tests")
+            test = {"impactor": "steel ball", "impactor_mass": 0.11, "base": "fixed", "drops": [{"drop_height": 0.05, "rebound_height": 0.0048}] * 3}
+            assert abs(lab.measure("felt", test, dry_run=True)["evaluation"]["restitution"]["mean"] - 0.31) < 0.01 and lab.measurements("felt") == []
+            lab.measure("felt", test)
+            assert len(lab.measurements("felt")) == 1
+            assert lab.derived("sponge", damper_mass=0.1107, structure_mass=1.35)
+            with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
+                file.write("0 0\n0.02 1\n0.04 -1\n0.06 0\n")
+                file.flush()
+                lab.upload("pulse", file.name, unit="m/s^2", source="a test", processing="none")
+            times, samples = lab.record_samples("pulse")
+            assert list(times) == [0, 0.02, 0.04, 0.06] and list(samples) == [0, 1, -1, 0] and lab.record("pulse")["count"] == 4
+            assert list(lab.records()["name"]) == ["pulse"] and refused(lab.upload, "pulse", [1, 2], interval=1).status == 409
+            assert lab.run(short("no_damper", excitation={"kind": "record", "name": "pulse"})).summary["peak_displacement"] > 0
+            assert lab.check("paper_free_sponge")["cost"]["cpu_seconds"] < 0.1 and "paper_free_sponge" in lab.examples()
+            assert lab.jobs(q="no such").empty and len(lab.jobs()) == 1
+
+
+def test_files_are_whole_or_absent():
+    """save() writes what the daemon answers for each extension, and leaves nothing where that fails."""
+    with laboratory() as lab, tempfile.TemporaryDirectory() as folder:
+        r = lab.run("paper_free_sponge")
+        s = lab.sweep(short(), {CLEARANCE: [0.01, 0.02]})
+        for result, name, part in ((r, "a.npy", None), (r, "a.csv", "impacts"), (r, "a.zip", None), (r, "a.svg", "psd"), (r, "a.json", None),
+                                   (s, "s.csv", None), (s, "s.json", None), (s, "s.npz", None)):
+            path = os.path.join(folder, name)
+            result.save(path, part)
+            assert os.path.getsize(path) > 100 and os.stat(path).st_mode & 0o600 == 0o600
+        assert numpy.load(os.path.join(folder, "a.npy")).shape == (10001, 6)
+        with open(os.path.join(folder, "a.json"), encoding="utf-8") as file:
+            assert set(json.load(file)) == {"job", "series", "impacts", "psd"}
+        kept = sorted(os.listdir(folder))
+        assert refused(r.save, os.path.join(folder, "a.html")).status == 404 and sorted(os.listdir(folder)) == kept
+
+
+def test_tls_needs_a_known_authority():
+    """https works with ca_file alone; without it the message names it."""
+    with tempfile.TemporaryDirectory() as folder:
+        key, certificate = f"{folder}/key.pem", f"{folder}/cert.pem"
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", key, "-out",
+                        certificate, "-days", "2", "-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"], check=True, capture_output=True)
+        with subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", certificate,
+                               "--tls-key", key], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+            try:
+                url = process.stdout.readline().split()[-1]
+                assert url.startswith("https://127.0.0.1:"), url
+                assert "ca_file" in str(raised(ConnectionError, impactd.connect, url))
+                assert impactd.connect(url, ca_file=certificate).version["program"] == "impactd"
+            finally:
+                process.terminate()
+
+
+def test_the_notebook_gives_the_papers_numbers():
+    """The cells of paper_figures.ipynb run, are at most 60 lines without outputs, and reproduce what tests/paper measures."""
+    with open(os.path.join(program.SOURCE, "web", "client", "paper_figures.ipynb"), encoding="utf-8") as file:
+        notebook = json.load(file)
+    assert notebook["nbformat"] == 4 and notebook["metadata"]["kernelspec"]["language"] == "python"
+    assert len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in cells)
+    assert sum(1 for cell in cells for line in "".join(cell["source"]).splitlines() if line.strip()) <= 60
+    names = {}
+    with program.daemon() as daemon, unittest.mock.patch.dict(os.environ, {"IMPACTD_SERVER": daemon.url}), \
+            contextlib.redirect_stdout(io.StringIO()) as printed:
+        for cell in cells:
+            exec("".join(cell["source"]), names)  # pylint: disable=exec-used
+    for buffer, (stiffness, damping) in {"sponge": (1650, 4.05), "soft_rubber": (2990, 8.80), "hard_rubber": (65700, 32.5),
+                                         "hard_acrylic": (118000, 48.7), "aluminium": (11.9e6, 530)}.items():  # Table I
+        assert abs(names["table"][buffer][0] / stiffness - 1) < 0.005 and abs(names["table"][buffer][1] / damping - 1) < 0.005, buffer
+    impacts = {key: r.summary["impacts"] for key, r in names["free"].items()}
+    assert impacts["sponge", "spring_damper"] == impacts["aluminium", "spring_damper"] == 22 and impacts["sponge", "impulse"] == 30, impacts
+    assert abs(names["difference"]["aluminium"] - 0.005) < 0.001 and abs(names["difference"]["sponge"] - 0.706) < 0.001, names["difference"]
+    assert len(names["runs"]) == 80 and names["apart"]["aluminium"] < 0.05 and abs(names["apart"]["sponge"] - 16.2) < 0.1, names["apart"]
+    hard, soft = names["first"]["aluminium"], names["first"]["sponge"]
+    assert round(hard["peak_force"] / soft["peak_force"]) == 77 and round(soft["duration"] / hard["duration"]) == 89
+    assert all(0.02 < abs(value) < 0.13 for value in names["change"].values()), names["change"]
+    assert "k_b =      1656 N/m" in printed.getvalue()
+    matplotlib.pyplot.close("all")
+
+
+OCTAVE = """
+lab = impactd();
+r = lab.run('paper_free_sponge');
+s = lab.series(r); d = lab.series(r, 'displacement'); t = lab.impacts(r); [f, p] = lab.psd(r); e = lab.energy(r);
+assert(r.summary.impacts == 22 && numel(t) == 22 && strcmp(t(1).side, 'right') && abs(t(1).start - 0.0416214) < 1e-6);
+assert(numel(s.time) == 10001 && s.time(end) == 10 && max(abs(s.displacement)) == 0.015 && numel(fieldnames(d)) == 2);
+assert(numel(f) == 2049 && abs(f(p == max(p)) - 3.66211) < 1e-4 && abs(e.initial - 0.0973125) < 1e-9);
+w = lab.run('scene.json', 'dampers.0.clearance', 0.01, '/contact/model', 'impulse', 'duration', 2);
+assert(strcmp(w.plan.contact_model, 'impulse') && numel(lab.series(w).time) == 2001);
+t = lab.sweep('paper_free_sponge', {'dampers.0.clearance', linspace(0.005, 0.025, 3); 'dampers.0.buffer', {'sponge', 'aluminium'}}, 'duration', 2);
+assert(numel(t.rms_displacement) == 6 && t.dampers_0_clearance(end) == 0.025 && strcmp(t.dampers_0_buffer{2}, 'aluminium@1'));
+a = lab.study('ensemble', 'paper_random_sponge', struct('runs', 4), 'duration', 2); assert(a.runs == 4);
+scene = struct('structure', struct('mass', 1.35, 'stiffness', 865, 'damping', 1.092), 'dampers', ...
+    struct('mass', 0.1107, 'clearance', 0.015, 'buffer', 'sponge'), 'excitation', struct('kind', 'free', 'displacement', 0.015), ...
+    'duration', 10, 'sample_rate', 1000);
+rs = lab.gather(lab.submit({scene, 'paper_free_aluminium'})); assert(rs{1}.summary.impacts == 22 && strcmp(rs{1}.result, r.result));
+lab.save(r, 'motion.csv'); lab.save(r, 'all.zip'); assert(size(dlmread('motion.csv', ',', 1, 0), 1) == 10001);
+m = lab.materials(); assert(numel(m) == 5 && lab.material('sponge@1').contact_time == 0.025);
+try; lab.run('paper_free_sponge', 'dampers.0.clearnce', 1); error('none'); catch e; end
+assert(strcmp(e.identifier, 'impactd:problem') && ~isempty(strfind(e.message, '/dampers/0/clearnce: unknown key; did you mean "clearance"?')));
+try; lab.run('paper_free_sponge', 'dampers.3.mass', 1); error('none'); catch e; end
+assert(strcmp(e.identifier, 'impactd:problem'));
+try; impactd('http://127.0.0.1:1'); error('none'); catch e; end
+assert(strcmp(e.identifier, 'impactd:connection'));
+disp('all is well');
+"""
+
+
+def test_octave_has_the_same_calls():
+    """impactd.m in Octave, with a token: run with overrides, series, impacts, psd, sweep, studies, gather, files and faults."""
+    with tempfile.TemporaryDirectory() as folder, program.daemon(data=os.path.join(folder, "data")) as daemon:
+        for name, text in (("test.m", OCTAVE), ("scene.json", json.dumps(program.scene("paper_free_sponge")))):
+            with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+                file.write(text)
+        os.symlink(os.path.join(program.SOURCE, "web", "client", "impactd.m"), os.path.join(folder, "impactd.m"))
+        environment = {**os.environ, "IMPACTD_SERVER": daemon.url, "IMPACTD_TOKEN": token(daemon.data, "octave")}
+        done = subprocess.run(["octave-cli", "-q", "--no-init-file", "test.m"], cwd=folder, env=environment, capture_output=True, text=True,
+                              timeout=120, check=False)
+        assert "all is well" in done.stdout, done
+        assert daemon.get("/client/impactd.m").status == daemon.get("/client/paper_figures.ipynb").status == 200
 
 if __name__ == "__main__":
     program.main(globals())

@@ -282,6 +282,7 @@ class _Http:
         self.token, self.timeout, self.patience = token, timeout, patience
         self.idle: list[http.client.HTTPConnection] = []
         self.lock = threading.Lock()
+        self.is_known = False  # whether it has answered before: then it may be starting again
 
     def close(self) -> None:
         with self.lock:
@@ -339,11 +340,12 @@ class _Http:
                                       "name the file of its authority as ca_file") from error
             except (OSError, http.client.HTTPException) as error:
                 failures += 1
-                if not is_safe or failures > _RETRIES or isinstance(error, ConnectionRefusedError):
+                if not is_safe or failures > (_RETRIES if self.is_known else 0):
                     raise ConnectionError(f"no answer from {self.url}: {error or type(error).__name__}; "
                                           "is the server running (impactd serve)?") from error
                 time.sleep(min(0.1 * 4 ** failures, 5) * random.uniform(0.5, 1))
                 continue
+            self.is_known = True
             if reply.status in (301, 307, 308) and method == "GET" and hops < 3:
                 hops, path = hops + 1, self.path(reply.headers.get("Location", ""))
                 continue
@@ -673,7 +675,7 @@ class Result:
 
         .csv .npy .npz .mat   the time series, of a study its table; part="psd", "impacts" or "energy" another part
         .svg                  a chart of them
-        .json                 the job, the series, the impacts and the spectra in one document
+        .json                 the job, the series, the impacts and the spectra in one document; of a study its answer
         .zip                  everything, with a note on units and how to cite
         """
         path = os.fspath(path)
@@ -743,10 +745,13 @@ class Result:
         rows = "".join(f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
                        for name, value in self._rows())
         notes = "".join(f"<p>{html.escape(one['pointer'])}: {html.escape(one['detail'])}</p>" for one in self.warnings)
+        page = f"<h4>{html.escape(self._title())}</h4><table>{rows}</table>{notes}"
+        try:
+            chart = base64.b64encode(self._lab._http.request("GET", self._part(self._svg_part)).body).decode()
+        except Problem:  # a scene without channels has no chart
+            return page
         # As an image: the style of a chart must not reach the page.
-        chart = base64.b64encode(self._lab._http.request("GET", self._part(self._svg_part)).body).decode()
-        return (f"<h4>{html.escape(self._title())}</h4><table>{rows}</table>{notes}"
-                f"<img alt='chart' style='max-width:100%' src='data:image/svg+xml;base64,{chart}'>")
+        return page + f"<img alt='chart' style='max-width:100%' src='data:image/svg+xml;base64,{chart}'>"
 
     def __repr__(self) -> str:
         return f"<impactd.{type(self).__name__} {self.id[:10]} {self._title()!r}>"
@@ -769,6 +774,11 @@ class Study(Result):
     def kind(self) -> str:
         """The kind of the study, such as "sweep"."""
         return self.document["study"]["kind"]
+
+    @property
+    def warnings(self) -> list[dict[str, str]]:
+        """What to know about the study and about the run of the scene as given."""
+        return [*self.answer.get("warnings", []), *super().warnings]
 
     @property
     def _table_part(self) -> str:  # type: ignore[override]
@@ -808,6 +818,9 @@ class Study(Result):
         _required("pandas", "frame")
         return self.table
 
+    def _whole(self) -> dict[str, Any]:
+        return self.answer
+
     def best(self, metric: Optional[str] = None, goal: str = "minimize") -> dict[str, Any]:
         """The best row of the table.
 
@@ -838,7 +851,7 @@ class Study(Result):
         best = self.answer["best"]
         if best is None:
             raise Problem({"title": "No candidate meets the constraints", "type": "/problems/infeasible", "status": 422,
-                           "detail": "; ".join(one["detail"] for one in self.warnings)})
+                           "errors": self.answer["warnings"]})
         values = {_dotted(name): one["value"] for one in best["values"] for name in one["pointers"] or [one["pointer"]]}
         return {**values, **{one["metric"]: one["value"] for one in best["objectives"]}, "feasible": best["feasible"]}
 
@@ -1002,16 +1015,23 @@ class Lab:
         """Submits a scene and returns its Job at once; of a list of scenes a list of Jobs in the same order.
 
         While the queue of the server is full, this waits as long as the server says. Each scene is sent with an
-        Idempotency-Key of its own, so that a repeated request cannot run it twice.
+        Idempotency-Key of its own, so that a repeated request cannot run it twice. If one scene of a list is refused, the
+        others are cancelled and its Problem is raised.
         """
         if isinstance(scenes, (collections.abc.Mapping, str, os.PathLike, Result)):
             return self._post(self.scene(scenes, **overrides), "respond-async")
         documents = [self.scene(one, **overrides) for one in scenes]
         jobs: list[Any] = [None] * len(documents)
         for index, job in _parallel(lambda document: self._post(document, "respond-async"), documents):
-            if isinstance(job, Exception):
-                raise job
             jobs[index] = job
+        for index, error in enumerate(jobs):
+            if isinstance(error, Exception):
+                for job in jobs:
+                    if isinstance(job, Job):
+                        job.cancel()
+                if isinstance(error, Problem):
+                    error.title = f"Item {index} of the list: {error.title}"
+                raise error
         return jobs
 
     def gather(self, jobs: Iterable[Union[Job, Scene]], *, ordered: bool = False, errors: str = "raise",
@@ -1020,7 +1040,8 @@ class Lab:
 
         errors    "raise": the Problem of a failed job is raised; "return": it is yielded in the place of the result
         progress  True: a line on standard error; or a function that is called with (done, total)
-        cancel    whether Ctrl-C cancels the jobs that are not finished; by default as `connect` was told
+        cancel    whether Ctrl-C, or a loop that is left early, cancels the jobs that are not finished; by default as
+                  `cancel_on_interrupt` of connect says
 
             jobs = lab.submit(lab.scene("paper_random_sponge", **{"excitation.seed": i}) for i in range(100))
             for r in lab.gather(jobs):
@@ -1032,17 +1053,13 @@ class Lab:
             for count, (index, result) in enumerate(_parallel(lambda job: job.result(), jobs), 1):
                 shown(count)
                 waiting[index] = result
-                ready = [index]
-                if ordered:
-                    ready = []
-                    while place in waiting and len(ready) < len(waiting):
-                        ready, place = ready + [place], place + 1
-                for one in ready:
-                    result = waiting.pop(one)
+                while (place if ordered else index) in waiting:
+                    result = waiting.pop(place if ordered else index)
+                    place += 1
                     if isinstance(result, Exception) and not (errors == "return" and isinstance(result, Problem)):
                         raise result
                     yield result
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, GeneratorExit):
             if self._cancels if cancel is None else cancel:
                 for job in jobs:
                     if not job.is_finished:
