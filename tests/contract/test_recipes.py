@@ -10,6 +10,8 @@ as a terminal does. The words after the opening ``` say what a block is:
     json           a scene or a study (the daemon validates it), or another body of a request (its schema)
     json fragment  members of a document; must be JSON, with "..." anywhere it is only shown
     text output    the output of the block before; "..." or an ellipsis stands for any text
+    text terminal  the output of the last impactd command of the block before, on a terminal of 80 columns;
+                   the time that it took may differ
     LANGUAGE NAME  a word with a dot, such as tower.json: the block is also saved as this file
     LANGUAGE PATH  a word with a slash and a dot: an excerpt of this source file; lines of "..." leave lines out
     ... not-run    shown only; a reason may follow. Other languages and `text` are shown only, too
@@ -118,6 +120,7 @@ class Page:
         self.path, self.daemon, self.folder = path, daemon, folder
         self.interpreters = {}
         self.output = ""  # of the last block that ran
+        self.last = None  # that block
         self.environment = {**os.environ, "IMPACTD_SERVER": daemon.url, "HOME": folder, "XDG_STATE_HOME": folder,
                             "PATH": program.build + os.pathsep + os.environ["PATH"], "MPLBACKEND": "Agg", "LC_ALL": "C.UTF-8"}
         self.environment.pop("IMPACTD_TOKEN", None)
@@ -186,6 +189,21 @@ class Page:
                     faults.append(f"{name}: {error.message}")
         return "neither a scene nor another body (a part of a document is a `json fragment`):\n" + "\n".join(faults)
 
+    def terminal(self):
+        """What the last impactd command of the block before prints on a terminal of 80 columns."""
+        lines = commands(self.last).replace("\\\n", " ").split("\n")
+        command = [line for line in lines if line.startswith("impactd ")][-1]
+        run = subprocess.run(["script", "-qec", f"stty cols 80; {self.here(command)} 2>/dev/null", "/dev/null"], cwd=self.folder,
+                             env={**self.environment, "TERM": "xterm", "NO_COLOR": "1"}, stdout=subprocess.PIPE, timeout=MAX_SECONDS,
+                             check=True)
+        return run.stdout.decode().replace("\r\n", "\n")
+
+    def compare_terminal(self, block):
+        """How the terminal differs from a block that shows it, or None."""
+        output = self.terminal()
+        shown, printed = (re.sub(r"\bin\s+[\d.]+\s+[mu]?s\b", "", text).split() for text in (block.text, output))
+        return None if printed == shown else f"the terminal does not show this but:\n{output}"
+
     def compare(self, block):
         """How the output differs from a block of expected output, or None."""
         if self.output is None:
@@ -217,11 +235,14 @@ class Page:
             self.output = None
             return None
         if block.language in INTERPRETERS:
+            self.last = block
             return self.run(block)
         if block.language == "json":
             return self.validate(block)
         if block.language == "text" and "output" in block.words:
             return self.compare(block)
+        if block.language == "text" and "terminal" in block.words:
+            return self.compare_terminal(block)
         return None
 
     def close(self):
@@ -293,6 +314,7 @@ def test_a_fault_is_found_at_its_line():
              "```python\nx = 1\n```\n\n```python\nassert x == 2\n```\n": ', line 6, in <module>',
              "```octave\nx = 1;\n```\n```octave\nassert(x == 2)\n```\n": ":5: ```octave exit code 1",
              "```console\n$ echo one\nthree\n```\n```text output\n...two\n```\n": "the output is not the printed one but:\none",
+             "```sh\nimpactd version\n```\n```text terminal\nimpactd 0\n```\n": "the terminal does not show this but:\nimpactd 0.",
              '```json\n{"structure": {"mass": -1}}\n```\n': "must be above 0 kg",
              '```json\n{"slug": "a", "colour": 1}\n```\n': "neither a scene nor another body",
              '```json fragment\n"a": 1, b\n```\n': "not JSON",
