@@ -12,6 +12,7 @@
 #include "server/api/app.h"
 #include "server/cli/files.h"
 #include "server/http/reply.h"
+#include "server/util/embedded.h"
 
 enum { COLUMNS_MIN = 40, COLUMNS_MAX = 120, NOTES_SHOWN = 4, TITLE_LEVEL = 1 };
 
@@ -41,6 +42,8 @@ void report_sentence(Report *report, const char *format, ...) {
     text_fit_format(text, sizeof text, format, arguments);
     va_end(arguments);
     text_make_printable(text);
+    if (text[0] >= 'a' && text[0] <= 'z')
+        text[0] = (char)(text[0] - 'a' + 'A');
     if (texts_append(&report->sentences, text) != STATUS_OK)
         report->is_failed = true;
 }
@@ -101,11 +104,15 @@ void report_real(PrintTable *table, double value) {
         print_table_add(table, "%.6g", value);
 }
 
-void report_count(PrintTable *table, uint64_t count) {
-    if (count == COUNT_ABSENT)
-        print_table_add(table, "%s", "");
-    else
-        print_table_add(table, "%llu", (unsigned long long)count);
+void report_fact(PrintTable *table, const char *name, Bytes *text) {
+    print_table_add(table, "%s", name);
+    print_table_add(table, "%s", text->at != NULL ? text->at : "");
+    bytes_clear(text);
+}
+
+const char *report_seconds(char target[32], double seconds) {
+    snprintf(target, 32, seconds < 1 ? "%.3g ms" : "%.3g s", seconds < 1 ? 1e3 * seconds : seconds);
+    return target;
 }
 
 void report_quantity(PrintTable *table, const char *name, const char *unit) {
@@ -277,37 +284,6 @@ void report_print(Report *report, const Terminal *terminal, const Texts *files) 
 
 // --- page ---
 
-static const char report_style_sheet[] =
-    ":root { color-scheme: light dark; --back: light-dark(#fff, #16181c); --text: light-dark("
-    "#1a1f29, #e8ecf2); --quiet: light-dark(#505a69, #a9b4c4); --line: light-dark(#d5dae2, "
-    "#3a4352); --soft: light-dark(#f5f6f8, #20242c); --warn: light-dark(#8a5300, #f0b45a); }\n"
-    "body { margin: 0; background: var(--back); color: var(--text); font: 16px/1.5 system-ui, "
-    "sans-serif; overflow-wrap: anywhere; }\n"
-    "main { max-width: 62rem; margin: 0 auto; padding: 1rem; }\n"
-    "h1 { font-size: 1.6rem; line-height: 1.25; margin: .5rem 0; }\n"
-    "h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; }\n"
-    "p { margin: 0 0 .7rem; }\n"
-    ".scroll { overflow-x: auto; margin: 0 0 1rem; }\n"
-    "table { border-collapse: collapse; font-variant-numeric: tabular-nums; overflow-wrap: normal; "
-    "}\n"
-    "th, td { padding: .25rem 1rem .25rem 0; text-align: left; vertical-align: top; "
-    "border-bottom: 1px solid var(--line); }\n"
-    "thead th { color: var(--quiet); }\n"
-    "tbody th { font-weight: normal; }\n"
-    "th.n, td.n { text-align: right; white-space: nowrap; }\n"
-    "figure { margin: 0; overflow-x: auto; }\n"
-    "figure svg { display: block; width: 100%; min-width: 36rem; }\n"
-    ".notes li { border-left: 4px solid var(--warn); background: var(--soft); list-style: none; "
-    "padding: .4rem .8rem; margin: 0 0 .5rem; }\n"
-    ".notes { padding: 0; }\n"
-    "code, pre { font: .875rem/1.45 monospace; }\n"
-    "pre { background: var(--soft); border: 1px solid var(--line); border-radius: 6px; padding: "
-    ".8rem; white-space: pre-wrap; }\n"
-    "footer { margin-top: 2.5rem; border-top: 1px solid var(--line); padding-top: .8rem; color: "
-    "var(--quiet); font-size: .9rem; }\n"
-    "@media print { :root { color-scheme: light; } main { max-width: none; padding: 0; } figure, "
-    "tr, li { break-inside: avoid; } h2 { break-after: avoid; } figure svg { min-width: 0; } }\n";
-
 static void page_put(Bytes *bytes, const char *before, const char *text, const char *after) {
     bytes_text(bytes, before);
     chart_escape(bytes, text);
@@ -341,7 +317,7 @@ void report_write_page(Report *report, const ReportPage *page, Bytes *bytes) {
     bytes_text(bytes, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
                       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
     page_put(bytes, "<title>", title, "</title>\n<style>\n");
-    bytes_text(bytes, report_style_sheet);
+    bytes_text(bytes, embedded_find(embedded_web, "web/report.css")->bytes);
     page_put(bytes, "</style>\n</head>\n<body>\n<main>\n<h1>", title, "</h1>\n");
     for (size_t i = 0; i < report->sentences.count; i++)
         page_put(bytes, "<p>", report->sentences.at[i], "</p>\n");

@@ -47,8 +47,10 @@ Chart *report_chart(Report *report, const char *heading, size_t panels, size_t h
 // Cells: six digits; an unknown number is empty. The name of a quantity has spaces for its
 // underscores, and its unit.
 void report_real(PrintTable *table, double value);
-void report_count(PrintTable *table, uint64_t count); // COUNT_ABSENT is empty
 void report_quantity(PrintTable *table, const char *name, const char *unit);
+// A row of a table without heads; the text is cleared.
+void report_fact(PrintTable *table, const char *name, Bytes *text);
+const char *report_seconds(char target[32], double seconds); // "8.1 ms"
 
 // The terminal of the standard output. False: it is a file or a pipe.
 typedef struct Terminal {

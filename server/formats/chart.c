@@ -263,57 +263,71 @@ static void panel_put_tick(const ChartPanel *panel, bool is_x, double value, con
     bytes_text(bytes, "</text>\n");
 }
 
-// Not every decade is labelled where there are many; where there are few, 2 and 5 times it are too.
-static void panel_put_decades(const ChartPanel *panel, bool is_x, Bytes *bytes) {
-    const ChartAxis *axis = is_x ? &panel->x : &panel->y;
-    const int from = (int)floor(axis->min), to = (int)floor(axis->max);
-    const int every = (to - from + DECADES_LABELLED) / (DECADES_LABELLED + 1);
-    const int steps[] = {1, 2, 5}, count = axis->max - axis->min < 2 ? 3 : 1;
-    char text[CHART_LABEL];
-    for (int decade = from; decade <= to; decade++)
-        for (int i = 0; i < count; i++) {
-            const double at = decade + log10(steps[i]);
-            if (at < axis->min - 1e-9 || at > axis->max + 1e-9)
-                continue;
-            snprintf(text, sizeof text, "%.4g", steps[i] * pow(10, decade));
-            panel_put_tick(panel, is_x, steps[i] * pow(10, decade),
-                           every > 1 && (to - decade) % every != 0 ? NULL
-                           : count > 1                             ? text
-                                                                   : "",
-                           decade, bytes);
-        }
-}
-
 // Steps of 1, 2 or 5 times a power of ten.
-double chart_axis_step(const ChartAxis *axis, double parts) {
+static double axis_step(const ChartAxis *axis, double parts) {
     const double part = (axis->max - axis->min) / parts;
     const double power = pow(10, floor(log10(part))), rest = part / power;
     return power * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
 }
 
-static void panel_put_steps(const ChartPanel *panel, bool is_x, Bytes *bytes) {
-    const ChartAxis *axis = is_x ? &panel->x : &panel->y;
-    const double step = chart_axis_step(axis, !is_x && panel->height < 120 ? 2 : 4);
-    const double first = ceil(axis->min / step - 1e-9);
-    char text[CHART_LABEL];
-    for (int i = 0; i < TICKS_MAX && (first + i) * step <= axis->max + 1e-9 * step; i++) {
-        snprintf(text, sizeof text, "%.4g", (first + i) * step);
-        panel_put_tick(panel, is_x, (first + i) * step, text, 0, bytes);
+static size_t axis_label(ChartLabel labels[CHART_LABELS], size_t count, double value) {
+    if (count == CHART_LABELS)
+        return count;
+    labels[count] = (ChartLabel){.value = value};
+    snprintf(labels[count].text, sizeof labels[count].text, "%.4g", value);
+    return count + 1;
+}
+
+size_t chart_axis_labels(const ChartAxis *axis, double parts, ChartLabel labels[CHART_LABELS]) {
+    size_t count = 0;
+    for (; count < axis->tick_count; count++) {
+        labels[count] = (ChartLabel){axis->ticks[count].value, .note = axis->ticks[count].note};
+        text_fit(labels[count].text, sizeof labels[count].text, axis->ticks[count].text);
     }
+    if (count > 0)
+        return count;
+    if (!axis->is_logarithmic) {
+        const double step = axis_step(axis, parts), first = ceil(axis->min / step - 1e-9);
+        for (int i = 0; i < TICKS_MAX && (first + i) * step <= axis->max + 1e-9 * step; i++)
+            count = axis_label(labels, count, (first + i) * step);
+        return count;
+    }
+    // Not every decade is labelled where there are many; of few, 2 and 5 times them are too.
+    const int from = (int)floor(axis->min), to = (int)floor(axis->max);
+    const int every = (int)fmax(1, ceil((to - from) / parts));
+    const bool has_parts = axis->max - axis->min < 2;
+    static const int factors[] = {1, 2, 5};
+    for (int decade = from; decade <= to; decade++)
+        for (size_t i = 0; i < (has_parts ? COUNT(factors) : 1); i++) {
+            const double at = decade + log10(factors[i]);
+            if (at < axis->min - 1e-9 || at > axis->max + 1e-9 || count == CHART_LABELS)
+                continue;
+            count = axis_label(labels, count, factors[i] * pow(10, decade));
+            labels[count - 1].decade = decade;
+            labels[count - 1].is_power = !has_parts;
+            labels[count - 1].is_hidden = (to - decade) % every != 0;
+        }
+    return count;
 }
 
 static void panel_put_axis(const ChartPanel *panel, bool is_x, Bytes *bytes) {
     const ChartAxis *axis = is_x ? &panel->x : &panel->y;
-    for (size_t i = 0; i < axis->tick_count; i++) {
-        const ChartTick *tick = &axis->ticks[i];
-        panel_put_tick(panel, is_x, tick->value, tick->text, 0, bytes);
-        chart_put_text(bytes, panel->left - 8, panel_y(panel, tick->value) + 18, "end", "faint",
-                       tick->note);
+    ChartLabel labels[CHART_LABELS];
+    const size_t count = chart_axis_labels(axis,
+                                           axis->is_logarithmic           ? DECADES_LABELLED + 1
+                                           : !is_x && panel->height < 120 ? 2
+                                                                          : 4,
+                                           labels);
+    for (size_t i = 0; i < count; i++) {
+        const ChartLabel *label = &labels[i];
+        panel_put_tick(panel, is_x, label->value,
+                       label->is_hidden  ? NULL
+                       : label->is_power ? ""
+                                         : label->text,
+                       label->decade, bytes);
+        chart_put_text(bytes, panel->left - 8, panel_y(panel, label->value) + 18, "end", "faint",
+                       label->note);
     }
-    if (axis->tick_count == 0 && axis->is_logarithmic)
-        panel_put_decades(panel, is_x, bytes);
-    else if (axis->tick_count == 0)
-        panel_put_steps(panel, is_x, bytes);
 }
 
 // --- series ---

@@ -15,6 +15,7 @@ enum {
     CHART_TICKS = 8,
     CHART_TEXT = 160,
     CHART_LABEL = 48,
+    CHART_LABELS = 100,
     CHART_LEGEND_MARGIN = 100, // a wider margin on the right has the legends, else they are inside
 };
 
@@ -114,11 +115,18 @@ typedef struct ChartText {
 // Appends one panel, with its heading, labels and legend; the chart remains.
 void chart_write_text(Chart *chart, size_t panel, const ChartText *form, Bytes *bytes);
 
-// Of chart.c, for other renderings: sets ranges, the place of a value from 0 to 1, and steps of
-// round numbers for at least so many labels.
+// Of chart.c, for other renderings: the ranges of all axes, whether a value is on an axis, its
+// place there from 0 to 1, and its labels at round values, about `parts` or more of them.
+typedef struct ChartLabel {
+    double value;
+    char text[CHART_LABEL];
+    const char *note;         // as in a ChartTick
+    int decade;               // of a logarithmic axis
+    bool is_power, is_hidden; // ten to the power of `decade`; there is no room for its text
+} ChartLabel;
 void chart_fit(Chart *chart);
-double chart_axis_share(const ChartAxis *axis, double value);
-double chart_axis_step(const ChartAxis *axis, double parts);
 bool chart_axis_shows(const ChartAxis *axis, double value);
+double chart_axis_share(const ChartAxis *axis, double value);
+size_t chart_axis_labels(const ChartAxis *axis, double parts, ChartLabel labels[CHART_LABELS]);
 
 #endif

@@ -8,7 +8,7 @@
 #include "core/base/status.h"
 #include "server/formats/chart.h"
 
-enum { TEXT_LABELS = 24, TEXT_LABEL = 24, GLYPHS_MAX = 40, SHADES = 5 };
+enum { GLYPHS_MAX = 40, SHADES = 4 };
 
 // Of the palette of chart.c in the terminal's 256 colours: legible on light and on dark ground.
 static const unsigned char text_colours[CHART_COLOURS] = {32,  166, 35, 133, 136, 244,
@@ -127,8 +127,8 @@ static void text_put_markers(const TextCanvas *canvas, const ChartSeries *series
 }
 
 static const char *text_shade(const TextCanvas *canvas, size_t level) {
-    static const char *const utf8[SHADES] = {" ", "\u2591", "\u2592", "\u2593", "\u2588"};
-    static const char *const ascii[SHADES] = {".", ":", "+", "*", "#"};
+    static const char *const utf8[SHADES] = {"\u2591", "\u2592", "\u2593", "\u2588"};
+    static const char *const ascii[SHADES] = {":", "+", "*", "#"};
     return canvas->form->is_utf8 ? utf8[canvas->form->has_colour ? SHADES - 1 : level]
                                  : ascii[level];
 }
@@ -178,52 +178,23 @@ static void text_put_series(const TextCanvas *canvas, const ChartSeries *series)
 
 // --- labels ---
 
-typedef struct TextLabel {
-    size_t at; // a row from the top, or a column
-    char text[TEXT_LABEL];
-} TextLabel;
-
 typedef struct TextLabels {
-    TextLabel of[TEXT_LABELS];
+    ChartLabel of[CHART_LABELS];
+    size_t at[CHART_LABELS]; // columns, or rows from the bottom
     size_t count, width;
 } TextLabels;
 
-static void text_label_add(TextLabels *labels, const ChartAxis *axis, size_t cells, double value,
-                           const char *text) {
-    if (labels->count == TEXT_LABELS)
-        return;
-    TextLabel *label = &labels->of[labels->count++];
-    label->at = (size_t)(chart_axis_share(axis, value) * (double)cells * (1 - 1e-9));
-    if (text == NULL)
-        snprintf(label->text, sizeof label->text, "%.4g", value);
-    else
-        text_fit(label->text, sizeof label->text, text);
-    const size_t width = text_width(label->text);
-    labels->width = width > labels->width ? width : labels->width;
-}
-
-static TextLabels text_labels(const ChartAxis *axis, size_t cells, double parts) {
-    TextLabels labels = {.count = 0};
-    const double span = axis->max - axis->min;
-    for (size_t i = 0; i < axis->tick_count; i++)
-        text_label_add(&labels, axis, cells, axis->ticks[i].value, axis->ticks[i].text);
-    if (axis->tick_count > 0)
-        return labels;
-    if (!axis->is_logarithmic) {
-        const double step = chart_axis_step(axis, parts), first = ceil(axis->min / step - 1e-9);
-        for (int i = 0; (first + i) * step <= axis->max + 1e-9 * step; i++)
-            text_label_add(&labels, axis, cells, (first + i) * step, NULL);
-        return labels;
+static void text_find_labels(const ChartAxis *axis, size_t cells, double parts,
+                             TextLabels *labels) {
+    labels->width = 0;
+    labels->count = chart_axis_labels(axis, parts, labels->of);
+    for (size_t i = 0; i < labels->count; i++) {
+        ChartLabel *label = &labels->of[i];
+        const size_t width = text_width(label->text);
+        labels->at[i] = (size_t)(chart_axis_share(axis, label->value) * (double)cells * (1 - 1e-9));
+        if (!label->is_hidden && width > labels->width)
+            labels->width = width;
     }
-    const int every = (int)fmax(1, ceil(span / fmax(parts, 1)));
-    for (int decade = (int)floor(axis->min); decade <= axis->max; decade++)
-        for (int factor = 1; factor <= (span < 2 ? 5 : 1); factor += factor == 1 ? 1 : 3) {
-            const double value = factor * pow(10, decade), at = log10(value);
-            if (at >= axis->min - 1e-9 && at <= axis->max + 1e-9 &&
-                ((int)floor(axis->max + 1e-9) - decade) % every == 0)
-                text_label_add(&labels, axis, cells, value, NULL);
-        }
-    return labels;
 }
 
 // --- lines ---
@@ -265,7 +236,7 @@ static void text_put_rows(const TextCanvas *canvas, const TextLabels *labels, By
     for (size_t row = 0; row < canvas->rows; row++) {
         const char *text = "";
         for (size_t i = 0; i < labels->count; i++)
-            if (canvas->rows - 1 - labels->of[i].at == row)
+            if (canvas->rows - 1 - labels->at[i] == row && !labels->of[i].is_hidden)
                 text = labels->of[i].text;
         text_repeat(bytes, " ", labels->width - text_width(text));
         bytes_format(bytes, "%s %s", text,
@@ -285,14 +256,14 @@ static void text_put_axis(const TextCanvas *canvas, size_t margin, const TextLab
     size_t end = 0;
     Bytes below = {.count = 0};
     for (size_t i = 0; i < labels->count; i++) {
-        const size_t at = labels->of[i].at, width = text_width(labels->of[i].text);
+        const size_t at = labels->at[i], width = text_width(labels->of[i].text);
         size_t start = margin + 2 + at;
         start -= width / 2 < start ? width / 2 : start;
         if (start + width > canvas->form->columns)
             start = canvas->form->columns - width;
         if (line[at].glyph == NULL)
             line[at].glyph = is_utf8 ? "\u252c" : "+";
-        if (end > 0 && start < end + 1)
+        if (labels->of[i].is_hidden || (end > 0 && start < end + 1))
             continue;
         text_repeat(&below, " ", start - end);
         bytes_text(&below, labels->of[i].text);
@@ -368,7 +339,8 @@ void chart_write_text(Chart *chart, size_t index, const ChartText *form, Bytes *
         bytes_text(bytes, "  not known\n");
         return;
     }
-    const TextLabels y = text_labels(&panel->y, form->rows, (double)form->rows / 3);
+    TextLabels x, y;
+    text_find_labels(&panel->y, form->rows, (double)form->rows / 3, &y);
     canvas.columns = form->columns > y.width + 12 ? form->columns - y.width - 2 : 10;
     canvas.width = (int)canvas.columns * (form->is_utf8 ? 2 : 1);
     canvas.height = (int)canvas.rows * (form->is_utf8 ? 4 : 2);
@@ -377,7 +349,7 @@ void chart_write_text(Chart *chart, size_t index, const ChartText *form, Bytes *
         bytes->is_failed = true;
         return;
     }
-    const TextLabels x = text_labels(&panel->x, canvas.columns, (double)canvas.columns / 14);
+    text_find_labels(&panel->x, canvas.columns, (double)canvas.columns / 14, &x);
     double range[2] = {(double)INFINITY, -(double)INFINITY};
     for (size_t i = panel->count; i-- > 0;)
         if (panel->series[i].kind == CHART_MAP)

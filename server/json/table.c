@@ -111,8 +111,12 @@ void print_table_print(const PrintTable *table, const PrintTableForm *form, FILE
         const size_t k = i % all;
         if (k >= columns)
             continue;
-        text_fit(cell, form->width > 0 && widths[k] + 1 < sizeof cell ? widths[k] + 1 : sizeof cell,
-                 print_table_cell(table, i));
+        const size_t room = form->width > 0 && widths[k] + 1 < sizeof cell ? widths[k] : 0;
+        const char *whole = print_table_cell(table, i);
+        if (room > 0 && *whole == '/' && strlen(whole) > room) // the end of a pointer says more
+            snprintf(cell, sizeof cell, "...%s", whole + strlen(whole) - (room - 3));
+        else
+            text_fit(cell, room > 0 ? room + 1 : sizeof cell, whole);
         const size_t width = text_width(cell), pad = widths[k] > width ? widths[k] - width : 0;
         const bool is_last = k + 1 == columns || i + 1 == table->count;
         fprintf(file, "%s%*s%s%*s%s%s", form->has_colour && i < heads ? "\033[2m" : "",

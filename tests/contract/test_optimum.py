@@ -67,7 +67,7 @@ def test_the_command_prints_the_gain_and_the_values_of_rivals_and_front():
     assert blocks["Gain"][0].split()[:2] == ["quantity", "best"], out
     seeds["study"]["objectives"].append({"metric": "peak_contact_force"})
     code, out = program.on_terminal("optimize", scene=seeds)
-    assert code == 0 and "\nFront\nvalues " in out, out
+    assert code == 0 and "\nBest compromises\nvalues " in out, out
 
 
 def test_two_objectives_and_constraints_that_none_keeps():
