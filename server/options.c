@@ -10,7 +10,22 @@
 
 #include "core/base/spelling.h"
 
-enum { NAME_SIZE = OPTION_NAME, LINE_SIZE = 4096 };
+enum { NAME_SIZE = OPTION_NAME, LINE_SIZE = 4096, HELP_WIDTH = 80, HELP_INDENT = 28 };
+
+// Names with the same letter and the same kind of value in every command. All others are long only,
+// and their value is named after their kind.
+static const struct {
+    const char *name;
+    char letter;         // '\0': none
+    const char *operand; // NULL: by its kind
+} option_words[] = {
+    {"output", 'o', "FILE"},      {"json", 'j', NULL},           {"server", 's', "URL"},
+    {"data", 'd', "DIR"},         {"listen", 'l', "HOST:PORT"},  {"wait", 'w', NULL},
+    {"dry_run", 'n', NULL},       {"record", 'r', "FILE"},       {"config", 'c', "FILE"},
+    {"set", '\0', "PATH=VALUE"},  {"vary", '\0', "PATH=VALUES"}, {"label", '\0', "KEY=VALUE"},
+    {"token_file", '\0', "FILE"}, {"ca_file", '\0', "FILE"},     {"tls_cert", '\0', "FILE"},
+    {"tls_key", '\0', "FILE"},    {"trace", '\0', "FILE"},       {"base_url", '\0', "URL"},
+};
 
 // The destination of one options_read.
 typedef struct OptionReader {
@@ -143,17 +158,26 @@ static void option_unknown(const OptionReader *reader, const char *typed, const 
     (void)problem_add_fault(reader->problem, STATUS_USAGE, &fault);
 }
 
-// The row of a flag, and in *value what follows its "=". -o is the first row with that letter.
+// The place of a name in the table of words, or of a letter if `name` is NULL; COUNT(option_words)
+// if it is not there.
+static size_t option_word(const char *name, char letter) {
+    size_t i = 0;
+    while (i < COUNT(option_words) && (name != NULL ? strcmp(option_words[i].name, name) != 0
+                                                    : option_words[i].letter != letter))
+        i++;
+    return i;
+}
+
+// The row of a flag, and in *value what follows its "=".
 static const Field *flag_row(const OptionReader *reader, const char *flag, char name[NAME_SIZE],
                              const char **value) {
     const char *equals = strchr(flag, '=');
     if (flag[1] != '-') {
-        const Field *row = reader->fields;
-        while (row->kind != FIELD_KIND_END && row->name[0] != flag[1])
-            row++;
+        const size_t word = option_word(NULL, flag[1]);
         *value = flag[2] == '\0' ? NULL : flag[2] == '=' ? flag + 3 : flag + 2;
         snprintf(name, NAME_SIZE, "%c", flag[1]);
-        return row->kind == FIELD_KIND_END ? NULL : row;
+        return word < COUNT(option_words) ? row_find(reader->fields, option_words[word].name)
+                                          : NULL;
     }
     *value = equals == NULL ? NULL : equals + 1;
     snprintf(name, NAME_SIZE, "%.*s", (int)strcspn(flag + 2, "="), flag + 2);
@@ -287,12 +311,22 @@ Status options_read(const Field *fields, void *item, int argc, char *const *argv
     return problem->count > before ? STATUS_USAGE : STATUS_OK;
 }
 
-char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]) {
+char option_spell(const Field *row, char name[OPTION_NAME]) {
+    const size_t word = option_word(row->name, '\0');
     name_spell(name, "--", row->name);
-    bool is_first = row->name[0] != 'h'; // -h is help
-    for (const Field *other = fields; other < row; other++)
-        is_first = is_first && other->name[0] != row->name[0];
-    return is_first ? row->name[0] : '\0';
+    return word < COUNT(option_words) ? option_words[word].letter : '\0';
+}
+
+const char *option_operand(const Field *row) {
+    const size_t word = option_word(row->name, '\0');
+    if (row->kind == FIELD_KIND_FLAG)
+        return NULL;
+    if (word < COUNT(option_words) && option_words[word].operand != NULL)
+        return option_words[word].operand;
+    return row->kind == FIELD_KIND_REAL     ? "X"
+           : row->kind == FIELD_KIND_COUNT  ? "N"
+           : row->kind == FIELD_KIND_CHOICE ? "NAME"
+                                            : "TEXT";
 }
 
 void option_value(const Field *row, const void *item, Bytes *text) {
@@ -327,21 +361,39 @@ void options_print(const Field *fields, const void *item, const Options *options
     }
 }
 
+// Prints a text in lines that begin at HELP_INDENT; the cursor is at column `at`.
+static void help_wrap(const char *text, size_t at, FILE *file) {
+    for (const char *word = text; *word != '\0'; word += strspn(word, " ")) {
+        const size_t size = strcspn(word, " ");
+        const bool is_first = word == text;
+        if (is_first ? at + 2 > HELP_INDENT : at + 1 + size > HELP_WIDTH) {
+            fputc('\n', file);
+            at = 0;
+        }
+        const size_t gap = at < HELP_INDENT ? HELP_INDENT - at : 1;
+        fprintf(file, "%*s%.*s", (int)gap, "", (int)size, word);
+        at += gap + size;
+        word += size;
+    }
+    fputc('\n', file);
+}
+
 void options_help(const Field *fields, const OptionGroup *groups, FILE *file) {
     for (const Field *row = fields; row->kind != FIELD_KIND_END; row++) {
-        char spelt[OPTION_NAME], left[2 * OPTION_NAME], letter[8] = "   ";
+        char spelt[OPTION_NAME], letter[8] = "    ";
+        const char *operand = option_operand(row), *unit = row->unit;
+        Bytes doc = {0};
         for (const OptionGroup *group = groups; group != NULL && group->first != NULL; group++)
             if (strcmp(group->first, row->name) == 0)
                 fprintf(file, "%s%s\n", row == fields ? "" : "\n", group->title);
-        if (option_spell(fields, row, spelt) != '\0')
-            snprintf(letter, sizeof letter, "-%c,", row->name[0]);
-        snprintf(left, sizeof left, "%s %s%s", letter, spelt,
-                 row->kind == FIELD_KIND_TEXT    ? " TEXT"
-                 : row->kind == FIELD_KIND_TEXTS ? " TEXT ..."
-                 : row->kind == FIELD_KIND_FLAG  ? ""
-                 : row->kind == FIELD_KIND_COUNT ? " N"
-                                                 : " X");
-        fprintf(file, "  %-28s %s%s%s%s\n", left, row->doc, row->unit != NULL ? " [" : "",
-                row->unit != NULL ? row->unit : "", row->unit != NULL ? "]" : "");
+        const char found = option_spell(row, spelt);
+        if (found != '\0')
+            snprintf(letter, sizeof letter, "-%c, ", found);
+        const int at = fprintf(file, "  %s%s%s%s", letter, spelt, operand != NULL ? " " : "",
+                               operand != NULL ? operand : "");
+        bytes_format(&doc, "%s%s%s%s", row->doc, unit != NULL ? " [" : "", unit != NULL ? unit : "",
+                     unit != NULL ? "]" : "");
+        help_wrap(doc.at != NULL ? doc.at : row->doc, at > 0 ? (size_t)at : 0, file);
+        bytes_clear(&doc);
     }
 }

@@ -24,7 +24,8 @@ typedef struct Options {
 } Options;
 
 // Reads the arguments behind the command's name into `item`, which holds its defaults. Row
-// "max_body" is --max-body N, and -m if it is the first row with that letter; "--" ends the flags.
+// "max_body" is --max-body N. A few names also have a letter, the same in every command: "output"
+// is -o. "--" ends the flags.
 // With `prefix` ("IMPACTD_"; NULL: flags only) it is also IMPACTD_MAX_BODY of the environment and
 // the line "max_body = N" of the file that a TEXT row "config" names. All faults are added, at the
 // name that was used; a value that a stronger source overrides is not checked.
@@ -36,16 +37,19 @@ void option_value(const Field *row, const void *item, Bytes *text);
 // One line per row in the format of the file, with the origin of the value as a comment.
 void options_print(const Field *fields, const void *item, const Options *options, FILE *file);
 
-// The flag of a row: "--max-body" into `name`; returns its letter, '\0' if another row has it.
+// The flag of a row: "--max-body" into `name`; returns its letter, '\0' if it has none.
 enum { OPTION_NAME = 96 };
-char option_spell(const Field *fields, const Field *row, char name[OPTION_NAME]);
+char option_spell(const Field *row, char name[OPTION_NAME]);
+// The value of a row's flag in help texts: "FILE", "N"; NULL: it takes none.
+const char *option_operand(const Field *row);
 
 // A heading above the row `first`.
 typedef struct OptionGroup {
     const char *first, *title;
 } OptionGroup;
 
-// One line per row for --help; `groups` end with first == NULL; NULL: no headings.
+// The rows for --help, in lines of at most 80 columns; `groups` end with first == NULL; NULL: no
+// headings.
 void options_help(const Field *fields, const OptionGroup *groups, FILE *file);
 
 #endif

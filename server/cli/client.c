@@ -195,7 +195,7 @@ static Status operands_check(const ApiCall *call, Problem *problem) {
         action->needs != NULL ? fields_find(call->command->options, action->needs, &offset) : NULL;
     if (row != NULL && field_is_absent(row, (const char *)call->settings + offset)) {
         char option[OPTION_NAME];
-        (void)option_spell(call->command->options, row, option);
+        (void)option_spell(row, option);
         return problem_add(problem, STATUS_USAGE, option, "is required for %s: %s", name, row->doc);
     }
     return STATUS_OK;

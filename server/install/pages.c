@@ -40,9 +40,9 @@ static void unit_print(FILE *file, const Field *row) {
     fputs("]", file);
 }
 
-static void option_print(FILE *file, const Field *fields, const Field *row) {
+static void option_print(FILE *file, const Field *row) {
     char name[OPTION_NAME];
-    const char letter = option_spell(fields, row, name);
+    const char letter = option_spell(row, name);
     fputs(".TP\n", file);
     if (letter != '\0')
         fprintf(file, "\\fB\\-%c\\fR, ", letter);
@@ -56,11 +56,8 @@ static void option_print(FILE *file, const Field *fields, const Field *row) {
             escaped(file, row->choices[i], false);
         }
         fputs("\\fR", file);
-    } else if (row->kind != FIELD_KIND_FLAG) {
-        fputs(row->kind == FIELD_KIND_COUNT  ? " \\fIN\\fR"
-              : row->kind == FIELD_KIND_REAL ? " \\fIX\\fR"
-                                             : " \\fITEXT\\fR",
-              file);
+    } else if (option_operand(row) != NULL) {
+        fprintf(file, " \\fI%s\\fR", option_operand(row));
     }
     fputc('\n', file);
     escaped(file, row->doc, true);
@@ -137,7 +134,7 @@ static void manual_program(FILE *file) {
         fputs(".\n", file);
         help_print(file, command->help);
         for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++)
-            option_print(file, command->options, row);
+            option_print(file, row);
     }
     fputs(back, file);
 }
@@ -245,7 +242,7 @@ static void completion_command(FILE *file, const Command *command) {
     char name[OPTION_NAME];
     fprintf(file, "    %s) case $prev:$cur in\n", command->name);
     for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
-        const char letter = option_spell(command->options, row, name);
+        const char letter = option_spell(row, name);
         if (row->kind == FIELD_KIND_FLAG)
             continue;
         fprintf(file, "        %s:*%s%.*s%s) ", name, letter != '\0' ? " | -" : "",
@@ -257,7 +254,7 @@ static void completion_command(FILE *file, const Command *command) {
     }
     fputs("        *:-*) words='--help", file);
     for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
-        (void)option_spell(command->options, row, name);
+        (void)option_spell(row, name);
         fprintf(file, " %s", name);
     }
     fputs("' ;;\n", file);

@@ -13,7 +13,7 @@ typedef struct Settings {
     char *listen, *config;
     bool quiet;
     int level;
-    Texts names;
+    Texts record;
 } Settings;
 
 static const char *const levels[] = {"low", "high", NULL};
@@ -26,7 +26,7 @@ static const Field fields[] = {
     FIELD_TEXT(Settings, config, 200, PRESENCE_OPTIONAL, 0, "file"),
     FIELD_FLAG(Settings, quiet, false, "say less"),
     FIELD_CHOICE(Settings, level, levels, 0, "level"),
-    FIELD_TEXTS(Settings, names, NULL, NULL, 3, PRESENCE_OPTIONAL, 0, "names"),
+    FIELD_TEXTS(Settings, record, NULL, NULL, 3, PRESENCE_OPTIONAL, 0, "paths"),
     FIELD_END,
 };
 // clang-format on
@@ -47,7 +47,7 @@ static int stop(void **state) {
     unsetenv("TEST_QUEUE_MOST");
     unsetenv("TEST_CONFIG");
     unsetenv("TEST_RATE");
-    unsetenv("TEST_NAMES");
+    unsetenv("TEST_RECORD");
     return 0;
 }
 
@@ -56,26 +56,26 @@ static int stop(void **state) {
                  (char *[]){__VA_ARGS__}, prefix, &options, &problem)
 
 TEST_IN(texts_grow_with_each_flag_and_a_stronger_source_replaces_them, start, stop) {
-    setenv("TEST_NAMES", "of the environment", 1);
-    assert_int_equal(READ("TEST_", "--names", "a", "-n", "b", "--names=c d"), STATUS_OK);
-    assert_int_equal(settings.names.count, 3);
-    assert_string_equal(settings.names.at[0], "a");
-    assert_string_equal(settings.names.at[1], "b");
-    assert_string_equal(settings.names.at[2], "c d");
+    setenv("TEST_RECORD", "of the environment", 1);
+    assert_int_equal(READ("TEST_", "--record", "a", "-r", "b", "--record=c d"), STATUS_OK);
+    assert_int_equal(settings.record.count, 3);
+    assert_string_equal(settings.record.at[0], "a");
+    assert_string_equal(settings.record.at[1], "b");
+    assert_string_equal(settings.record.at[2], "c d");
     char *text = NULL;
     size_t size = 0;
     FILE *file = open_memstream(&text, &size);
     assert_non_null(file);
     options_print(fields, &settings, &options, file);
     fclose(file);
-    assert_non_null(strstr(text, "names = a, b, c d  # flag"));
+    assert_non_null(strstr(text, "record = a, b, c d  # flag"));
     free(text);
-    assert_int_equal(READ("TEST_", "-n", "e", "-n", "f", "-n", "g", "-n", "h"), STATUS_USAGE);
-    assert_string_equal(problem.faults[0].pointer, "-n");
+    assert_int_equal(READ("TEST_", "-r", "e", "-r", "f", "-r", "g", "-r=h"), STATUS_USAGE);
+    assert_string_equal(problem.faults[0].pointer, "-r");
 }
 
 TEST_IN(flags_set_values_and_other_arguments_are_operands, start, stop) {
-    assert_int_equal(READ(NULL, "one", "--rate", "2.5", "--queue-most=7", "-l", "a:1", "-q=9",
+    assert_int_equal(READ(NULL, "one", "--rate", "2.5", "--queue-most=7", "-la:1", "--queue-most=9",
                           "--quiet", "--level", "high", "-", "--", "--rate"),
                      STATUS_OK);
     assert_true(settings.rate == 2.5);
@@ -192,6 +192,39 @@ TEST_IN(printed_settings_can_be_read_as_a_file, start, stop) {
     assert_string_equal(settings.listen, "a:1");
 }
 
+TEST_IN(a_letter_stands_for_one_name_alone, start, stop) {
+    char name[OPTION_NAME];
+    assert_int_equal(option_spell(&fields[2], name), 'l');
+    assert_string_equal(name, "--listen");
+    assert_int_equal(option_spell(&fields[1], name), '\0');
+    assert_int_equal(READ(NULL, "-o", "-q"), STATUS_USAGE); // no row here; the first of a row
+    assert_int_equal(problem.count, 2);
+    assert_string_equal(problem.faults[0].pointer, "-o");
+}
+
+TEST(help_wraps_at_80_columns) {
+    static const char left[] = "  -l, --listen HOST:PORT    ",
+                      right[] = "                            ";
+    const Field rows[] = {
+        {.name = "listen",
+         .kind = FIELD_KIND_TEXT,
+         .doc = "first words of a text that is much longer than the line that it would need"},
+        {.name = "a_name_that_is_long", .kind = FIELD_KIND_REAL, .unit = "s", .doc = "below"},
+        FIELD_END};
+    char text[500] = "", wanted[500];
+    FILE *file = tmpfile();
+    assert_non_null(file);
+    options_help(rows, NULL, file);
+    rewind(file);
+    (void)!fread(text, 1, sizeof text - 1, file);
+    fclose(file);
+    snprintf(wanted, sizeof wanted,
+             "%sfirst words of a text that is much longer than the\n%sline that it would need\n"
+             "      --a-name-that-is-long X\n%sbelow [s]\n",
+             left, right, right);
+    assert_string_equal(text, wanted);
+}
+
 TEST(help_has_its_headings_above_their_rows) {
     static const OptionGroup groups[] = {{"rate", "Speed"}, {"quiet", "Manner"}, {NULL, NULL}};
     char text[2000] = "";
@@ -202,7 +235,8 @@ TEST(help_has_its_headings_above_their_rows) {
     const size_t size = fread(text, 1, sizeof text - 1, file);
     fclose(file);
     assert_true(size > 0);
-    assert_memory_equal(text, "Speed\n  -r, --rate X", 20);
+    assert_memory_equal(text, "Speed\n      --rate X              rate [Hz]\n", 42);
+    assert_non_null(strstr(text, "\n  -r, --record FILE         paths\n"));
     const char *manner = strstr(text, "\nManner\n");
     assert_non_null(manner);
     assert_true(strstr(text, "--config") < manner && strstr(text, "--quiet") > manner);
