@@ -14,6 +14,7 @@
 #include "core/base/spelling.h"
 #include "server/util/bytes.h"
 #include "server/util/dtoa.h"
+#include "server/util/units.h"
 
 enum {
     POINTER_SIZE = sizeof((Fault){0}.pointer),
@@ -150,13 +151,19 @@ decode_fault(Decoder *decoder, const char *pointer, const json_t *value, const c
     (void)problem_add_fault(decoder->problem, STATUS_INVALID, &fault);
 }
 
-// "must be a number [kg], is a string"; `field` (NULL: none) knows the unit.
+// "must be a number [kg], is a string"; `field` (NULL: none) knows the unit. A string that is a
+// quantity, "10 g", gets the number to write in its place.
 static void decode_wrong_type(Decoder *decoder, const char *pointer, const json_t *value,
                               const Field *field, const char *wanted) {
     const char *unit = field != NULL ? field->unit : NULL;
-    decode_fault(decoder, pointer, value, unit, NULL, "must be %s%s%s%s, is %s", wanted,
+    char hint[48] = "", reason[QUANTITY_REASON];
+    double number;
+    const bool is_quantity = json_is_string(value) && strstr(wanted, "number") != NULL;
+    if (is_quantity && quantity_read(json_string_value(value), unit, &number, reason))
+        snprintf(hint, sizeof hint, ": write %s", real_text(number).at);
+    decode_fault(decoder, pointer, value, unit, NULL, "must be %s%s%s%s, is %s%s", wanted,
                  unit != NULL ? " [" : "", unit != NULL ? unit : "", unit != NULL ? "]" : "",
-                 type_name(value));
+                 type_name(value), hint);
 }
 
 // "must be one of a, b, c, is "x"". Returns the nearest of the names, NULL if none is near. `item`:
