@@ -44,6 +44,7 @@ extern const Command command_serve, command_run, command_check, command_tradeoff
     command_cancel, command_compare;
 
 extern const Command *const commands[];        // NULL-terminated
+extern const OptionGroup command_groups[];     // headings, each above the command `first`
 const Command *command_find(const char *name); // NULL if there is none
 
 // The whole program: finds the command, answers --help, runs it. Returns the exit code.

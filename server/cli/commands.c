@@ -28,26 +28,35 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_serve,     &command_run,
-    &command_check,     &command_tradeoff,
-    &command_ensemble,  &command_study,
-    &command_sweep,     &command_optimize,
+    &command_run,       &command_check,
+    &command_sweep,     &command_ensemble,
+    &command_tradeoff,  &command_optimize,
     &command_calibrate, &command_response,
-    &command_fragility, &command_import,
-    &command_materials, &command_records,
+    &command_fragility, &command_study,
+    &command_import,    &command_serve,
     &command_token,     &command_backup,
     &command_restore,   &command_check_db,
     &command_submit,    &command_watch,
-    &command_get,       &command_cancel,
-    &command_compare,   &command_help,
+    &command_get,       &command_compare,
+    &command_cancel,    &command_materials,
+    &command_records,   &command_help,
     &command_version,   NULL,
+};
+
+const OptionGroup command_groups[] = {
+    {"run", "Run here, without a server"},
+    {"serve", "Run a server"},
+    {"submit", "Jobs of a server"},
+    {"materials", "Data of a server"},
+    {"help", "Help"},
+    {NULL, NULL},
 };
 
 static const char overview[] =
     "impactd simulates structures with impact dampers.\n"
     "\n"
-    "  impactd serve                        start the server on http://127.0.0.1:8080\n"
-    "  impactd run scene.json               run a scene without a server, print the job\n"
+    "  impactd serve                        start a server on http://127.0.0.1:8080\n"
+    "  impactd run scene.json               run a scene without a server\n"
     "  impactd submit scene.json --wait 60  run a scene on a server\n"
     "  impactd get JOB series -o out.npy    download a part of its result\n"
     "\n"
@@ -56,14 +65,13 @@ static const char overview[] =
     "  {\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},\n"
     "   \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],\n"
     "   \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015},\n"
-    "   \"duration\": 10, \"sample_rate\": 1000}\n"
-    "\n";
+    "   \"duration\": 10, \"sample_rate\": 1000}\n";
 
 static const char exits[] =
     "\n"
-    "See impactd help COMMAND. Exit codes: 0 ok, 1 failed, 2 usage, 3 faulty scene or file,\n"
-    "4 not found, 5 permission denied, 7 server unreachable, 8 job not finished after --wait,\n"
-    "130 interrupted.\n";
+    "\"impactd help COMMAND\" shows examples and options of a command. Exit codes: 0 ok,\n"
+    "1 failed, 2 usage, 3 faulty scene or file, 4 not found, 5 permission denied,\n"
+    "7 server unreachable, 8 job not finished after --wait, 130 interrupted.\n";
 
 const Command *command_find(const char *name) {
     for (size_t i = 0; commands[i] != NULL; i++)
@@ -73,9 +81,13 @@ const Command *command_find(const char *name) {
 }
 
 static void overview_print(FILE *file) {
+    const OptionGroup *group = command_groups;
     fputs(overview, file);
-    for (size_t i = 0; commands[i] != NULL; i++)
-        fprintf(file, "  %-9s %s\n", commands[i]->name, commands[i]->summary);
+    for (size_t i = 0; commands[i] != NULL; i++) {
+        if (group->first != NULL && strcmp(group->first, commands[i]->name) == 0)
+            fprintf(file, "\n%s\n", group++->title);
+        fprintf(file, "  %-9s  %s\n", commands[i]->name, commands[i]->summary);
+    }
     fputs(exits, file);
 }
 
