@@ -219,6 +219,14 @@ const Field *json_pointer_find(const Field *fields, const void *item, const char
     return is_found ? target.field : NULL;
 }
 
+const Field *json_pointer_row(const Field *fields, const void *item, const char *pointer,
+                              bool *is_tag, char message[JSON_POINTER_MESSAGE_MAX]) {
+    PointerTarget target = {0};
+    const bool is_found = json_pointer_walk(&target, fields, (void *)item, pointer, message);
+    *is_tag = is_found && target.is_tag;
+    return is_found ? target.field : NULL;
+}
+
 static Status json_pointer_fail_kind(const char *wanted, const Field *field,
                                      const JsonScalar *value,
                                      char message[JSON_POINTER_MESSAGE_MAX]) {

@@ -56,6 +56,10 @@ enum { JSON_POINTER_MESSAGE_MAX = 240 };
 const Field *json_pointer_find(const Field *fields, const void *item, const char *pointer,
                                bool *is_tag, char message[JSON_POINTER_MESSAGE_MAX]);
 
+// The same of any member, also if only an object or a list can replace it.
+const Field *json_pointer_row(const Field *fields, const void *item, const char *pointer,
+                              bool *is_tag, char message[JSON_POINTER_MESSAGE_MAX]);
+
 // Sets the member at `pointer` to `value`. Setting the name of a kind keeps members that both kinds
 // have and sets the others to defaults. A text for an item with a shorthand replaces the whole
 // item. Setting another member of such an item removes its name, which no longer describes the

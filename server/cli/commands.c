@@ -156,6 +156,14 @@ static int command_run_with(const Command *command, int argc, char *const *argv)
     return code;
 }
 
+// `run` with --vary is a sweep, which has all options of `run`.
+static const Command *command_vary(const Command *command, int argc, char *const *argv) {
+    for (int i = 2; i < argc && command == &command_run && strcmp(argv[i], "--") != 0; i++)
+        if (strncmp(argv[i], "--vary", 6) == 0)
+            return &command_sweep;
+    return command;
+}
+
 int command_main(int argc, char *const *argv) {
     if (argc < 2) {
         overview_print(stderr);
@@ -173,7 +181,8 @@ int command_main(int argc, char *const *argv) {
             command_print(command);
             return COMMAND_OK;
         }
-    const int code = command_run_with(command, is_flag ? 0 : argc - 2, argv + 2);
+    const int code =
+        command_run_with(command_vary(command, argc, argv), is_flag ? 0 : argc - 2, argv + 2);
     // A full disk or a closed pipe is a failure.
     if (fflush(stdout) != 0 && code == COMMAND_OK) {
         fputs("impactd: standard output cannot be written\n", stderr);

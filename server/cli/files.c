@@ -55,8 +55,13 @@ int input_command(const Command *self, const char *what, const Options *options,
     output_guard();
     Status status = input_read(path, &text, problem);
     if (status == STATUS_OK)
+        status = scene_edit(self, settings, &text, problem);
+    const bool is_edited = status == STATUS_OK;
+    if (is_edited)
         status = run(path, &text, settings, problem);
     bytes_clear(&text);
+    if (!is_edited && status == STATUS_USAGE)
+        return command_error(self->name, problem);
     if (status != STATUS_OK)
         command_print_faults(input_name(path), ": ", "\"", problem);
     return command_exit(status);

@@ -147,7 +147,7 @@ typedef struct JobsSettings {
     ClientSettings client;
     bool dry_run;
     char *title, *idempotency_key;
-    Texts label;
+    Texts label, set, vary;
     char *output, *channels;
     double from, to;
     uint64_t points, max_bytes;
@@ -198,6 +198,7 @@ static Status submit_act(ApiCall *call, Problem *problem) {
         return problem_add(problem, STATUS_USAGE, "--idempotency-key",
                            "must be of printable ASCII characters");
     TRY(input_read(call->operands[0], &call->body, problem));
+    TRY(scene_edit(call->command, settings, &call->body, problem));
     if (settings->title != NULL)
         TRY(json_edit_set(&call->body, "title", settings->title, problem));
     for (size_t i = 0; i < settings->label.count; i++)
@@ -330,6 +331,8 @@ static Status get_act(ApiCall *call, Problem *problem) {
 static const Field submit_fields[] = {
     CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for the job to finish and for a busy server (0)"),
+    SET_ROW(JobsSettings),
+    VARY_ROW(JobsSettings),
     FIELD_TEXT(JobsSettings, title, 0, PRESENCE_OPTIONAL, 0, "title of the job; replaces that of the scene"),
     FIELD_TEXTS(JobsSettings, label, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "KEY=VALUE, added to the labels of the scene; repeatable"),
     FIELD_FLAG(JobsSettings, dry_run, false, "print the plan and the estimated cost as JSON; run nothing"),

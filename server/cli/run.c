@@ -63,7 +63,7 @@ static Status scene_prepare(const Bytes *text, const RecordFiles *records,
 typedef struct RunSettings {
     char *output;
     bool json;
-    Texts record;
+    Texts record, set, vary;
     int unit;
     double max_cpu_seconds;
     const TableFormat *format; // of the output's extension; NULL without output, or for a page
@@ -73,6 +73,8 @@ static const Field run_fields[] = {
     FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
                "write to this file; its extension says what"),
     FIELD_FLAG(RunSettings, json, false, "print the finished job as JSON, also on a terminal"),
+    SET_ROW(RunSettings),
+    VARY_ROW(RunSettings),
     RECORD_ROWS(RunSettings),
     CPU_ROW(RunSettings),
     FIELD_END,
@@ -310,7 +312,7 @@ const Command command_run = {
 
 typedef struct CheckSettings {
     bool json;
-    Texts record;
+    Texts record, set, vary;
     int unit;
     double max_cpu_seconds;
 } CheckSettings;
@@ -318,6 +320,8 @@ typedef struct CheckSettings {
 static const Field check_fields[] = {
     FIELD_FLAG(CheckSettings, json, false,
                "print the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
+    SET_ROW(CheckSettings),
+    VARY_ROW(CheckSettings),
     RECORD_ROWS(CheckSettings),
     CPU_ROW(CheckSettings),
     FIELD_END,
@@ -393,7 +397,7 @@ const Command command_check = {
 typedef struct StudySettings {
     const Command *command;
     Texts output;
-    Texts record;
+    Texts record, set, vary;
     int unit;
     bool json;
     double max_cpu_seconds; // of the whole study; NAN: only each run is limited
@@ -574,6 +578,7 @@ static int study_command_run(const Command *self, void *of, const Options *optio
 static const Field study_fields[] = {
     OUTPUT_ROW(".json the whole, .csv or .npz the table or .svg the chart"),
     JSON_ROW,
+    SET_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
     STUDY_CPU_ROW,
     FIELD_END,
@@ -606,6 +611,7 @@ static const Field tradeoff_fields[] = {
                 "try this solver only; may be given again"),
     FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL,
                "solver steps a point may be predicted to take (5e7)"),
+    SET_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
     STUDY_CPU_ROW,
     FIELD_END,
@@ -664,6 +670,7 @@ static const Field ensemble_fields[] = {
         "peak_displacement, rms_displacement (usual), peak_acceleration, "
         "rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear "
         "or psd"),
+    SET_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
     STUDY_CPU_ROW,
     FIELD_END,
@@ -704,6 +711,8 @@ const Command command_ensemble = {
 static const Field sweep_fields[] = {
     OUTPUT_ROW(".json, .csv, .npy, .npz or .mat the table or .svg the chart"),
     JSON_ROW,
+    SET_ROW(StudySettings),
+    VARY_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
     STUDY_CPU_ROW,
     FIELD_END,

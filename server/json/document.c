@@ -1,6 +1,7 @@
 #include "server/json/document.h"
 
 #include <jansson.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -224,6 +225,52 @@ Status json_edit_label(Bytes *text, const char *label, Problem *problem) {
         return STATUS_OK;
     }
     return json_edit_write(text, root, is_set, problem);
+}
+
+// The member of an object or list.
+static json_t *json_edit_get(json_t *around, const char *name) {
+    return json_is_array(around) ? json_array_get(around, strtoul(name, NULL, 10))
+                                 : json_object_get(around, name);
+}
+
+Status json_edit_put(Bytes *text, const char *pointer, const Bytes *value, const char *place,
+                     Problem *problem) {
+    json_t *root = json_parse_tree(text->at, text->count), *around = root;
+    json_t *item =
+        value != NULL ? json_loadb(value->at, value->count, JSON_DECODE_ANY, NULL) : json_null();
+    char name[POINTER_SIZE], is[64] = "";
+    for (;; around = json_edit_get(around, name)) {
+        const size_t size = strcspn(++pointer, "/");
+        snprintf(name, sizeof name, "%.*s", (int)size, pointer);
+        pointer += size;
+        if (*pointer == '\0' || (!json_is_object(around) && !json_is_array(around)))
+            break;
+        if (json_is_object(around) && json_object_get(around, name) == NULL)
+            (void)json_object_set_new(around, name, json_object());
+    }
+    Status status = STATUS_OK;
+    bool is_set = false;
+    if (item == NULL)
+        status = problem_add(problem, STATUS_USAGE, place, "must be JSON, is %.*s",
+                             (int)(value->count < 100 ? value->count : 100), value->at);
+    else if (json_is_array(around))
+        is_set = json_array_set(around, strtoul(name, NULL, 10), item) == 0;
+    else if (json_is_object(around) && value == NULL)
+        is_set = json_object_get(around, name) == NULL || json_object_del(around, name) == 0;
+    else if (json_is_object(around))
+        is_set = json_object_set(around, name, item) == 0;
+    else if (root != NULL) {
+        text_quote(is, sizeof is, json_is_string(around) ? json_string_value(around) : "...");
+        status = problem_add(problem, STATUS_USAGE, place,
+                             "cannot be set: the scene has %s in place of the object around it; "
+                             "set that as JSON",
+                             is);
+    }
+    json_decref(item);
+    if (root != NULL && status == STATUS_OK)
+        return json_edit_write(text, root, is_set, problem);
+    json_decref(root);
+    return status;
 }
 
 Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Problem *problem) {

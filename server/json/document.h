@@ -28,6 +28,11 @@ Status json_edit_set(Bytes *text, const char *name, const char *value, Problem *
 // Adds "key=value" to the member "labels", an object or a list. STATUS_USAGE if `label` is not of
 // that form.
 Status json_edit_label(Bytes *text, const char *label, Problem *problem);
+// Sets the member at a JSON Pointer without escapes to a JSON value, or removes it where `value` is
+// NULL; objects around it that are missing are created. STATUS_USAGE, at `place`: the value is not
+// JSON, or lies in no object.
+Status json_edit_put(Bytes *text, const char *pointer, const Bytes *value, const char *place,
+                     Problem *problem);
 // Appends a JSON value to a list, which is created if it is missing. A member of another type is
 // left unchanged. STATUS_INVALID: the value is not JSON.
 Status json_edit_append(Bytes *text, const char *list, const Bytes *value, Problem *problem);

@@ -4,6 +4,7 @@
 import json
 import os
 import pty
+import re
 import resource
 import select
 import signal
@@ -28,11 +29,92 @@ def test_help_leads_with_examples():
     assert code == 0 and errors == ""
     lines = [line.strip() for line in out.splitlines() if line.strip()]
     assert lines[1].startswith("impactd serve"), lines[:3]
+    for group in ("Run here, without a server", "Run a server", "Jobs of a server", "Data of a server", "Help"):
+        assert f"\n{group}\n" in out, group
     for command in ("serve", "run", "check", "tradeoff", "ensemble", "import", "help", "version"):
         assert any(line.startswith(command + " ") for line in lines), command
         pages = [program.run("help", command), program.run(command, "--help"), program.run(command, "-h")]
         assert pages[0] == pages[1] == pages[2], command
         assert pages[0][0] == 0 and "impactd " + command in pages[0][1], command
+
+
+def test_a_letter_has_one_meaning():
+    """A letter belongs to the same option in all commands."""
+    names = re.findall(r"^  ([\w-]+)  +\S", program.run("--help")[1].split("1000}")[1], re.M)
+    assert len(names) > 20, names
+    letters = {}
+    for name in names:
+        text = program.run("help", name)[1]
+        for letter, option in re.findall(r"^  -(\w), (--[\w-]+)", text, re.M):
+            assert letters.setdefault(letter, option) == option, (name, letter, option, letters[letter])
+    assert letters["o"] == "--output" and letters["w"] == "--wait" and "h" not in letters, letters
+    code, _, errors = program.run("run", SPONGE, "-m", "1")
+    assert code == 2 and "-m is not an option" in errors, errors
+
+
+def test_set_gives_members_other_values_with_units():
+    """--set makes the scene that has these values in its text; a faulty path, value or unit names the option."""
+    scene = {**program.scene("paper_free_sponge"), "duration": 5}
+    scene["dampers"][0].update(clearance=0.035, buffer="aluminium")
+    wanted = json.loads(program.run("check", "-", "--json", text=json.dumps(scene))[1])["result"]
+    code, out, errors = program.run("check", SPONGE, "--json", "--set", "dampers.0.clearance=35 mm", "--set",
+                                    "/dampers/0/buffer=aluminium", "--set=duration=5000ms")
+    assert code == 0 and json.loads(out)["result"] == wanted, errors
+    code, out, _ = program.run("check", SPONGE, "--json", "--set", "excitation.kind=sine", "--set", "excitation.frequency=4",
+                               "--set", "excitation.amplitude=0.1g", "--set", "structure.mass=1350g", "--set",
+                               "structure.damping=null", "--set", "structure.damping_ratio=2%", "--set",
+                               'output.channels=["displacement"]', "--set", "output.psd=null", "--set", "title=12")
+    scene = json.loads(out)["scene"]
+    assert code == 0 and scene["excitation"]["amplitude"] == 0.1 * 9.80665 and scene["structure"]["mass"] == 1.35, scene
+    assert scene["structure"]["damping_ratio"] == 0.02 and scene["output"]["channels"] == ["displacement"], scene
+    for option, expected in [
+            ("dampers.0.clearance=10kg", "--set dampers.0.clearance is a length in m, 10kg is a mass; write 10mm"),
+            ("dampers.0.clearence=10mm", "clearance is meant"),
+            ("dampers.0.buffer.restitution=0.5", 'the scene has "sponge" in place of the object'),
+            ("dampers.1.mass=1g", '"1" is none of them'),
+            ("duration=ten", "must be a number [s], is ten"),
+            ("duration=10h", '"h" is not a unit; write ms, us, s, min'),
+            ("contact.model={", "must be JSON, is {"),
+            ("duration=", "needs a value"), ("duration", "must be PATH=VALUE")]:
+        for command in ("run", "check", "sweep", "ensemble"):
+            code, out, errors = program.run(command, SPONGE, "--set", option)
+            assert code == 2 and out == "" and expected in errors, (command, option, errors)
+    code, _, errors = program.run("run", "-", "--set", "duration=1", text="[1, 2")
+    assert code == 3 and "line 1" in errors, errors
+
+
+def test_vary_makes_a_sweep():
+    """--vary is the sweep of these axes, of `run` too; a sweep of the scene keeps its metrics."""
+    axes = [{"pointer": "/dampers/0/clearance", "from": 0.005, "to": 0.03, "count": 6},
+            {"pointer": "/dampers/0/mass", "from": 0.05, "to": 0.2, "count": 3, "spacing": "logarithmic"},
+            {"pointer": "/dampers/0/buffer", "values": ["sponge", "aluminium"]}]
+    scene = {**program.scene("paper_free_sponge"), "study": {"kind": "sweep", "axes": axes}}
+    wanted = program.run("sweep", "-", "--json", text=json.dumps(scene))[1]
+    options = ("--vary", "dampers.0.clearance=5mm:30mm:6", "--vary", "dampers.0.mass=50g:200g:3:log",
+               "--vary", "dampers.0.buffer=sponge,aluminium")
+    for command in ("run", "sweep"):
+        code, out, errors = program.run(command, SPONGE, "--json", *options)
+        assert code == 0 and out == wanted and '"points": 36,' in out, (command, errors)
+    scene["study"]["metrics"] = ["impacts"]
+    code, out, errors = program.run("sweep", "-", "--json", "--vary", "sample_rate=1kHz,2000", text=json.dumps(scene))
+    answer = json.loads(out)
+    assert code == 0 and "impacts" in answer["columns"] and "peak_displacement" not in answer["columns"] and answer["axes"][0]["values"] == [1000, 2000], answer
+    for option, expected in [("duration=1:10", "must be FROM:TO:COUNT"), ("duration=1:10:3:lin", "must be FROM:TO:COUNT"),
+                             ("duration=1:10g:3", "10g is a mass"), ("duration=1:10:3s", "has no unit, 3s is a time"),
+                             ("duratoin=1:2:3", "duration is meant")]:
+        code, _, errors = program.run("sweep", SPONGE, "--vary", option)
+        assert code == 2 and "--vary " + option.split("=")[0] in errors and expected in errors, (option, errors)
+
+
+def test_a_number_with_its_unit_in_a_scene_is_explained():
+    """A quantity as JSON text is a fault that has the number to write."""
+    scene = {**program.scene("paper_free_sponge"), "duration": "500 ms"}
+    scene["dampers"][0]["clearance"] = "35 mm"
+    scene["dampers"][0]["mass"] = "35 mm"
+    code, _, errors = program.run("check", "-", text=json.dumps(scene))
+    assert code == 3 and "/duration: must be a number [s], is a string: write 0.5\n" in errors, errors
+    assert "/dampers/0/clearance: must be a number [m], is a string: write 0.035\n" in errors, errors
+    assert "/dampers/0/mass: must be a number [kg], is a string\n" in errors, errors
 
 
 def test_usage_faults():

@@ -1,0 +1,203 @@
+// --set and --vary: the scene's text with other values, before it is read or sent, so that a server
+// and this program get the same scene. The Field row at a path decides what a value is.
+#include <stdio.h>
+#include <string.h>
+
+#include "core/base/json_pointer.h"
+#include "core/study/study.h"
+#include "server/cli/files.h"
+#include "server/json/document.h"
+#include "server/json/parse.h"
+#include "server/util/units.h"
+
+enum { PLACE_SIZE = sizeof((Fault){0}.pointer) };
+
+// One option, "PATH=VALUE".
+typedef struct SceneEdit {
+    char place[PLACE_SIZE]; // "--set PATH", for faults
+    char pointer[PLACE_SIZE];
+    const char *value;
+    bool takes_null; // of the row
+} SceneEdit;
+
+// "dampers.0.clearance=10mm", or with a JSON Pointer.
+static Status scene_edit_split(const char *option, const char *text, SceneEdit *edit,
+                               Problem *problem) {
+    const char *equals = strchr(text, '=');
+    const size_t size = equals != NULL ? (size_t)(equals - text) : 0;
+    if (size == 0 || size > PLACE_SIZE - 16)
+        return problem_add(problem, STATUS_USAGE, option,
+                           "must be PATH=VALUE, as dampers.0.clearance=10mm, is %.100s", text);
+    const bool is_pointer = text[0] == '/';
+    snprintf(edit->place, sizeof edit->place, "%s %.*s", option, (int)size, text);
+    snprintf(edit->pointer, sizeof edit->pointer, "%s%.*s", is_pointer ? "" : "/", (int)size, text);
+    for (char *c = edit->pointer; *c != '\0' && !is_pointer; c++)
+        *c = *c == '.' ? '/' : *c;
+    edit->value = equals + 1;
+    return STATUS_OK;
+}
+
+// The unit of a row; that of a sine's amplitude depends on its quantity.
+static const char *scene_edit_unit(const Field *row, const Bytes *text) {
+    if (row->unit == NULL || strcmp(row->unit, "m/s^2 or m") != 0)
+        return row->unit;
+    JsonDocument *scene = json_open(text);
+    const char *quantity = json_get_text(json_get_object(scene, "excitation"), "quantity");
+    const bool is_length = quantity != NULL && strcmp(quantity, "displacement") == 0;
+    json_close(scene);
+    return is_length ? "m" : "m/s^2";
+}
+
+// Appends one value as JSON: a number in the unit of the row, JSON as it is, else a text.
+static Status scene_edit_value(const SceneEdit *edit, const Field *row, bool is_tag,
+                               const char *unit, const char *value, Bytes *json, Problem *problem) {
+    char reason[QUANTITY_REASON];
+    double number;
+    const bool is_number =
+        !is_tag && (row->kind == FIELD_KIND_REAL || row->kind == FIELD_KIND_COUNT ||
+                    row->kind == FIELD_KIND_REALS || row->kind == FIELD_KIND_ROWS);
+    const bool is_json = strchr("[{\"", value[0]) != NULL || strcmp(value, "null") == 0 ||
+                         strcmp(value, "true") == 0 || strcmp(value, "false") == 0;
+    if (value[0] == '\0')
+        return problem_add(problem, STATUS_USAGE, edit->place, "needs a value behind \"=\"");
+    if (is_json)
+        bytes_text(json, value);
+    else if (!is_number)
+        bytes_json_string(json, value);
+    else if (quantity_read(value, unit, &number, reason))
+        bytes_real(json, number);
+    else
+        return problem_add(problem, STATUS_USAGE, edit->place, "%s", reason);
+    return STATUS_OK;
+}
+
+// Appends {"pointer", "from", "to", "count", "spacing"} for "5mm:30mm:26" or "5mm:30mm:26:log",
+// {"pointer", "values"} for "5mm,10mm".
+static Status scene_edit_axis(const SceneEdit *edit, const Field *row, bool is_tag,
+                              const char *unit, Bytes *json, Problem *problem) {
+    static const char *const names[] = {", \"from\": ", ", \"to\": ", ", \"count\": "};
+    static const Field count_row = {.kind = FIELD_KIND_COUNT};
+    char value[PLACE_SIZE];
+    const bool is_range = strchr(edit->value, ':') != NULL;
+    bytes_text(json, "{\"pointer\": ");
+    bytes_json_string(json, edit->pointer);
+    bytes_text(json, is_range ? "" : ", \"values\": [");
+    const char *at = edit->value;
+    for (size_t i = 0;; i++) {
+        const size_t size = strcspn(at, is_range ? ":" : ",");
+        const bool is_last = at[size] == '\0';
+        snprintf(value, sizeof value, "%.*s", (int)(size < PLACE_SIZE ? size : 0), at);
+        if (is_range && i == COUNT(names) && is_last && strcmp(value, "log") == 0) {
+            bytes_text(json, ", \"spacing\": \"logarithmic\"");
+            break;
+        }
+        if (is_range && (i >= COUNT(names) || (is_last && i + 1 < COUNT(names))))
+            return problem_add(problem, STATUS_USAGE, edit->place,
+                               "must be FROM:TO:COUNT or FROM:TO:COUNT:log, as 5mm:30mm:26, is "
+                               "%.100s",
+                               edit->value);
+        const bool is_count = is_range && i == 2;
+        bytes_text(json, is_range ? names[i] : i > 0 ? ", " : "");
+        TRY(scene_edit_value(edit, is_count ? &count_row : row, !is_count && is_tag,
+                             is_count ? NULL : unit, value, json, problem));
+        if (is_last)
+            break;
+        at += size + 1;
+    }
+    bytes_text(json, is_range ? "}" : "]}");
+    return STATUS_OK;
+}
+
+// Appends the JSON that the option asks for: a value, or an axis of a sweep. A text that cannot be
+// read as a scene at all is left to its reader; then nothing is appended.
+static Status scene_edit_read(SceneEdit *edit, bool is_axis, const Bytes *text, Bytes *json,
+                              Problem *problem) {
+    StudyRequest request;
+    char message[JSON_POINTER_MESSAGE_MAX];
+    bool is_tag;
+    Status status = STATUS_OK;
+    if (json_parse(text->at, text->count, study_request_fields, &request, NULL) !=
+        STATUS_UNREADABLE) {
+        const Field *row =
+            json_pointer_row(study_request_fields, &request, edit->pointer, &is_tag, message);
+        const char *unit = row != NULL ? scene_edit_unit(row, text) : NULL;
+        edit->takes_null = row != NULL && (row->flags & FIELD_NULL_IS_EMPTY) != 0;
+        if (row == NULL)
+            status =
+                problem_add(problem, STATUS_USAGE, edit->place, "names no member: %s", message);
+        else if (is_axis)
+            status = scene_edit_axis(edit, row, is_tag, unit, json, problem);
+        else
+            status = scene_edit_value(edit, row, is_tag, unit, edit->value, json, problem);
+    }
+    study_request_clear(&request);
+    return status;
+}
+
+static Status scene_edit_set(const Texts *sets, Bytes *text, Problem *problem) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < sets->count; i++) {
+        SceneEdit edit;
+        Bytes json = {0};
+        Status one = scene_edit_split("--set", sets->at[i], &edit, problem);
+        if (one == STATUS_OK)
+            one = scene_edit_read(&edit, false, text, &json, problem);
+        // Where null is no value of the member, it removes the member.
+        const bool is_null = json.count == 4 && strcmp(json.at, "null") == 0 && !edit.takes_null;
+        if (one == STATUS_OK && json.count > 0)
+            one = json_edit_put(text, edit.pointer, is_null ? NULL : &json, edit.place, problem);
+        bytes_clear(&json);
+        status = status == STATUS_OK ? one : status;
+    }
+    return status;
+}
+
+// The sweep of the scene keeps its other members; any other study is replaced.
+static Status scene_edit_vary(const Texts *varies, Bytes *text, Problem *problem) {
+    Bytes json = {0};
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < varies->count; i++) {
+        SceneEdit edit;
+        bytes_text(&json, i == 0 ? "[" : ", ");
+        Status one = scene_edit_split("--vary", varies->at[i], &edit, problem);
+        if (one == STATUS_OK)
+            one = scene_edit_read(&edit, true, text, &json, problem);
+        status = status == STATUS_OK ? one : status;
+    }
+    bytes_text(&json, "]");
+    JsonDocument *scene = json_open(text);
+    const char *kind = json_get_text(json_get_object(scene, "study"), "kind");
+    const bool is_sweep = kind != NULL && strcmp(kind, "sweep") == 0;
+    json_close(scene);
+    static const struct {
+        const char *pointer, *value;
+    } members[] = {{"/study", "{\"kind\": \"sweep\"}"}, {"/study/mode", "\"grid\""}};
+    for (size_t i = is_sweep ? 1 : 0; i < COUNT(members) && status == STATUS_OK; i++) {
+        Bytes value = {0};
+        bytes_text(&value, members[i].value);
+        status = json_edit_put(text, members[i].pointer, &value, "--vary", problem);
+        bytes_clear(&value);
+    }
+    if (status == STATUS_OK)
+        status = json_edit_put(text, "/study/axes", &json, "--vary", problem);
+    bytes_clear(&json);
+    return status;
+}
+
+// The texts of an option of the command; NULL if it has none.
+static const Texts *scene_edit_texts(const Command *self, const void *settings, const char *name) {
+    size_t offset = 0;
+    const Field *row = fields_find(self->options, name, &offset);
+    const void *texts = row != NULL ? (const char *)settings + offset + row->offset : NULL;
+    return texts != NULL && ((const Texts *)texts)->count > 0 ? texts : NULL;
+}
+
+Status scene_edit(const Command *self, const void *settings, Bytes *text, Problem *problem) {
+    if (self->options == NULL)
+        return STATUS_OK;
+    const Texts *set = scene_edit_texts(self, settings, "set");
+    const Texts *vary = scene_edit_texts(self, settings, "vary");
+    if (set != NULL)
+        TRY(scene_edit_set(set, text, problem));
+    return vary != NULL ? scene_edit_vary(vary, text, problem) : STATUS_OK;
+}
