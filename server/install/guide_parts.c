@@ -87,9 +87,9 @@ static void markdown_help(FILE *file, const char *help) {
     fputs(is_example ? "```\n\n" : "\n", file);
 }
 
-static void markdown_option(FILE *file, const Field *fields, const Field *row) {
+static void markdown_option(FILE *file, const Field *row) {
     char name[OPTION_NAME];
-    const char letter = option_spell(fields, row, name);
+    const char letter = option_spell(row, name);
     fputs("| ", file);
     if (letter != '\0')
         fprintf(file, "`-%c`, ", letter);
@@ -97,11 +97,8 @@ static void markdown_option(FILE *file, const Field *fields, const Field *row) {
     if (row->kind == FIELD_KIND_CHOICE)
         for (size_t i = 0; row->choices[i] != NULL; i++)
             fprintf(file, "%s%s", i > 0 ? "\\|" : " ", row->choices[i]);
-    else if (row->kind != FIELD_KIND_FLAG)
-        fputs(row->kind == FIELD_KIND_COUNT  ? " N"
-              : row->kind == FIELD_KIND_REAL ? " X"
-                                             : " TEXT",
-              file);
+    else if (option_operand(row) != NULL)
+        fprintf(file, " %s", option_operand(row));
     fputs("` | ", file);
     markdown_text(file, row->doc);
     if (row->unit != NULL) {
@@ -126,7 +123,7 @@ void part_commands(FILE *file) {
             continue;
         fputs("| option | meaning |\n|---|---|\n", file);
         for (const Field *row = command->options; row->kind != FIELD_KIND_END; row++)
-            markdown_option(file, command->options, row);
+            markdown_option(file, row);
         fputc('\n', file);
     }
 }
