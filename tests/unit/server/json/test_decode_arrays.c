@@ -57,7 +57,8 @@ TEST(what_is_no_matrix_is_told_where_it_is_none) {
     assert_int_equal(read(&item, "{\"matrix\": [[1, \"2\"], 3, [4, null]], \"start\": \"0\"}"),
                      STATUS_INVALID);
     assert_int_equal(problem.count, 4);
-    assert_string_equal(detail_at(&problem, "/matrix/0/1"), "must be a number [kg], is a string");
+    assert_string_equal(detail_at(&problem, "/matrix/0/1"),
+                        "must be a number [kg], is a string: write 2");
     assert_string_equal(detail_at(&problem, "/matrix/1"),
                         "must be an array of numbers [kg], is a number");
     assert_string_equal(detail_at(&problem, "/matrix/2/1"), "must be a number [kg], is null");

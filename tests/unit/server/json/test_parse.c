@@ -166,7 +166,9 @@ TEST_IN(labels_may_be_pairs, set_up, tear_down) {
 }
 
 TEST_IN(wrong_types_are_told_at_every_row, set_up, tear_down) {
-    check_fault("{\"offset\": \"1\"}", "/offset", "\"1\"", "must be a number [m], is a string");
+    check_fault("{\"offset\": \"1 s\"}", "/offset", "\"1 s\"", "must be a number [m], is a string");
+    check_fault("{\"offset\": \"1 mm\"}", "/offset", "\"1 mm\"",
+                "must be a number [m], is a string: write 0.001");
     check_fault("{\"mass\": null}", "/mass", "null", "must be a number [kg], is null");
     check_fault("{\"mass\": [1]}", "/mass", "", "must be a number [kg], is an array");
     check_fault("{\"slope\": true}", "/slope", "true", "must be a number, is true");
