@@ -63,7 +63,7 @@ TEST(what_is_no_matrix_is_told_where_it_is_none) {
                         "must be an array of numbers [kg], is a number");
     assert_string_equal(detail_at(&problem, "/matrix/2/1"), "must be a number [kg], is null");
     assert_string_equal(detail_at(&problem, "/start"),
-                        "must be a number or an array of numbers [m], is a string");
+                        "must be a number or an array of numbers [m], is a string: write 0");
     fields_clear(fields, &item);
     assert_int_equal(read(&item, "{\"matrix\": {}}"), STATUS_INVALID);
     assert_string_equal(detail_at(&problem, "/matrix"),
