@@ -69,7 +69,7 @@ def test_set_gives_members_other_values_with_units():
     assert scene["structure"]["damping_ratio"] == 0.02 and scene["output"]["channels"] == ["displacement"], scene
     for option, expected in [
             ("dampers.0.clearance=10kg", "--set dampers.0.clearance is a length in m, 10kg is a mass; write 10mm"),
-            ("dampers.0.clearence=10mm", "clearance is meant"),
+            ("dampers.0.clearence=10mm", "did you mean clearance?"),
             ("dampers.0.buffer.restitution=0.5", 'the scene has "sponge" in place of the object'),
             ("dampers.1.mass=1g", '"1" is none of them'),
             ("duration=ten", "must be a number [s], is ten"),
@@ -101,7 +101,7 @@ def test_vary_makes_a_sweep():
     assert code == 0 and "impacts" in answer["columns"] and "peak_displacement" not in answer["columns"] and answer["axes"][0]["values"] == [1000, 2000], answer
     for option, expected in [("duration=1:10", "must be FROM:TO:COUNT"), ("duration=1:10:3:lin", "must be FROM:TO:COUNT"),
                              ("duration=1:10g:3", "10g is a mass"), ("duration=1:10:3s", "has no unit, 3s is a time"),
-                             ("duratoin=1:2:3", "duration is meant")]:
+                             ("duratoin=1:2:3", "did you mean duration?")]:
         code, _, errors = program.run("sweep", SPONGE, "--vary", option)
         assert code == 2 and "--vary " + option.split("=")[0] in errors and expected in errors, (option, errors)
 
