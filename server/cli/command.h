@@ -41,7 +41,7 @@ extern const Command command_serve, command_run, command_check, command_tradeoff
     command_study, command_sweep, command_optimize, command_calibrate, command_response,
     command_fragility, command_import, command_materials, command_records, command_token,
     command_backup, command_restore, command_check_db, command_submit, command_watch, command_get,
-    command_cancel, command_compare;
+    command_cancel, command_compare, command_jobs, command_open;
 
 extern const Command *const commands[];        // NULL-terminated
 extern const OptionGroup command_groups[];     // headings, each above the command `first`
@@ -61,6 +61,11 @@ int command_error(const char *name, const Problem *problem);
 
 // The end of a command: prints the reason of a failure on stderr; returns the exit code.
 int command_end(const Command *self, Status status, const Problem *problem);
+
+// Prints a document as tables on standard output; on a terminal in its width and with colour.
+// *longest as in print_table_print_json.
+Status command_print_tables(const Bytes *json, const struct PrintTableView *view, size_t *longest,
+                            Problem *problem);
 
 // The index of the action that the first operand names. `names` points to the name of the first
 // action; those of the others follow at `stride` bytes, NULL after the last. STATUS_USAGE lists

@@ -82,7 +82,7 @@ static const PrintTableColumns columns[] = {
     {"measurements", {"measurement", "created", "author", "comment", "drops", "traces"}},
     {"warnings", {"pointer", "detail"}},
     {"materials",
-     {"slug", "revision", "status", "name", "kind", "restitution", "contact_time", "source"}},
+     {"slug", "revision", "status", "restitution", "contact_time", "kind", "name", "source"}},
     {"history", {"version", "when", "who", "action", "revision", "measurement", "why"}},
     {"differences", {"pointer", "from", "to", "unit"}},
     {"results", {"id", "created"}},

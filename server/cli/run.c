@@ -191,8 +191,7 @@ static void finding_print(const Finding *finding, const char *name, const Termin
     Report report = {.is_page = false};
     finding_report(finding, &report);
     if (report.next == NULL && files->count == 0)
-        report_next(&report, "impactd %s %s -o report.html", name,
-                    finding->path);
+        report_next(&report, "impactd %s %s -o report.html", name, finding->path);
     report_print(&report, terminal, files);
     report_clear(&report);
 }
@@ -343,7 +342,7 @@ static Status plan_print(const char *path, DryRun *run, const Bytes *json, Probl
     if (run->inquiry.study != NULL)
         printf("Study: %s\n", run->inquiry.study->kind->name);
     putchar('\n');
-    return print_table_print_json(json, &view, stdout, NULL, problem);
+    return command_print_tables(json, &view, NULL, problem);
 }
 
 static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {

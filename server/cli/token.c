@@ -93,7 +93,7 @@ static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, P
     if (is_json && json.is_failed)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the list");
     const Status status = is_json ? output_put(NULL, &json, problem)
-                                  : print_table_print_json(&json, &view, stdout, NULL, problem);
+                                  : command_print_tables(&json, &view, NULL, problem);
     bytes_clear(&json);
     return status;
 }

@@ -131,6 +131,7 @@ void print_table_print(const PrintTable *table, const PrintTableForm *form, FILE
 
 typedef struct Printer {
     const PrintTableView *view;
+    const PrintTableForm *form;
     FILE *file;
     size_t blocks, longest;
     char heading[HEADING_SIZE]; // of the last block
@@ -181,7 +182,7 @@ static void printer_table(Printer *printer, PrintTable *table, const char *headi
     text_fit(printer->heading, sizeof printer->heading, text);
     const size_t rows = table->count / table->columns - (table->has_heads ? 1 : 0);
     printer->longest = rows > printer->longest ? rows : printer->longest;
-    print_table_print(table, &(PrintTableForm){.width = 0}, printer->file);
+    print_table_print(table, printer->form, printer->file);
     print_table_clear(table);
 }
 
@@ -396,9 +397,11 @@ static void object_print(Printer *printer, json_t *object, const char *heading, 
     }
 }
 
-Status print_table_print_json(const Bytes *json, const PrintTableView *view, FILE *file,
-                              size_t *longest, Problem *problem) {
-    Printer printer = {.view = view, .file = file};
+Status print_table_print_json(const Bytes *json, const PrintTableView *view,
+                              const PrintTableForm *form, FILE *file, size_t *longest,
+                              Problem *problem) {
+    static const PrintTableForm plain = {.width = 0};
+    Printer printer = {.view = view, .form = form != NULL ? form : &plain, .file = file};
     if (json->is_failed)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tables");
     json_t *root = json_parse_tree(json->at, json->count);
