@@ -137,10 +137,9 @@ bool api_exposes_token(const ApiCall *call) {
     return call->token[0] != '\0' && !call->is_tls && !call->is_loopback;
 }
 
-// The letter of an operand in the table of actions.
-static char operand_kind(const ApiAction *action, size_t index) {
+char api_operand_kind(const ApiAction *action, size_t index) {
     const char *kind = action->operands;
-    for (; *kind == '?' || index > 0; kind++)
+    for (; *kind == '?' || (index > 0 && *kind != '\0'); kind++)
         index -= *kind != '?';
     return *kind;
 }
@@ -162,6 +161,7 @@ static bool operand_is_valid(char kind, const char *text) {
         return number_is_valid(text);
     case 't':
         return text[0] != '\0' && strcmp(text, "..") != 0;
+    case 'p':
     case 'f':
         return true;
     default:
@@ -180,7 +180,7 @@ static Status operands_check(const ApiCall *call, Problem *problem) {
         return problem_set(problem, STATUS_USAGE, "%s%stakes %s, is given %zu operands", name,
                            name[0] != '\0' ? " " : "", action->takes, call->count);
     for (size_t i = 0; i < call->count; i++) {
-        const char kind = operand_kind(action, i);
+        const char kind = api_operand_kind(action, i);
         if (!operand_is_valid(kind, call->operands[i]))
             return problem_set(
                 problem, STATUS_USAGE, "%s%stakes %s, is given \"%.80s\"%s", name,
@@ -391,6 +391,7 @@ static CURLcode transfer_perform(Transfer *transfer, const char *url, struct cur
     curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
     curl_easy_setopt(curl, CURLOPT_BUFFERSIZE, 262144L);
     curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, 10L);
+    curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS, call->answer_ms);
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, is_stream ? 1L : 100L); // [B/s]
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, (long)ceil(silence));
     curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers);
@@ -555,13 +556,14 @@ Status api_send(ApiCall *call, Problem *problem) {
                    problem);
 }
 
-// The pages that follow are added to the first one, and all are printed as one document.
-Status api_show(ApiCall *call, Problem *problem) {
+// The pages that follow are added to the first one.
+Status api_send_pages(ApiCall *call, size_t more, Problem *problem) {
     Bytes all = {0};
     char last[sizeof call->answer.next] = "";
     TRY(api_send(call, problem));
     Status status = STATUS_OK;
-    for (int page = 0; call->answer.next[0] != '\0' && status == STATUS_OK; page++) {
+    for (size_t page = 0; call->answer.next[0] != '\0' && page < more && status == STATUS_OK;
+         page++) {
         Bytes path = api_action_path(call);
         if (page == PAGES_MAX || strcmp(last, call->answer.next) == 0) {
             bytes_clear(&path);
@@ -583,7 +585,12 @@ Status api_show(ApiCall *call, Problem *problem) {
         all = (Bytes){0};
     }
     bytes_clear(&all);
-    return status != STATUS_OK ? status : api_print_tables(call, problem);
+    return status;
+}
+
+Status api_show(ApiCall *call, Problem *problem) {
+    TRY(api_send_pages(call, SIZE_MAX, problem));
+    return api_print_tables(call, problem);
 }
 
 Status api_download(ApiCall *call, ApiRequest *request, const char *path, Problem *problem) {
@@ -613,10 +620,25 @@ Status api_print_tables(ApiCall *call, Problem *problem) {
     if (view == NULL || ((const ClientSettings *)call->settings)->json)
         api_print(call);
     else
-        TRY(print_table_print_json(&call->answer.body, view, stdout, &rows, problem));
+        TRY(command_print_tables(&call->answer.body, view, &rows, problem));
     if (rows == 0)
         fprintf(stderr, "impactd %s: nothing fits\n", call->command->name);
     return STATUS_OK;
+}
+
+void api_print_members(const Command *self, void *settings, const char *path, const char *list,
+                       const char *const *names) {
+    ApiCall call = {.command = self, .settings = settings, .answer_ms = 300};
+    const JsonDocument *item;
+    if (api_open(&call, NULL) == STATUS_OK &&
+        api_get(&call, api_path("%s", path), NULL) == STATUS_OK) {
+        (void)api_reply(&call);
+        for (size_t i = 0; (item = json_get_item(call.reply, list, i)) != NULL; i++)
+            for (const char *const *name = names; *name != NULL; name++)
+                if (json_get_text(item, *name) != NULL)
+                    puts(json_get_text(item, *name));
+    }
+    api_close(&call);
 }
 
 bool api_is_id(const char *text) {
@@ -652,7 +674,7 @@ Bytes api_action_path(const ApiCall *call) {
             piece = "";
             break;
         }
-        if (operand_kind(call->action, i) == 't')
+        if (api_operand_kind(call->action, i) == 't')
             bytes_percent(&path, call->operands[i]);
         else
             bytes_text(&path, call->operands[i]);

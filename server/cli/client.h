@@ -30,7 +30,8 @@ typedef struct ApiAction {
     const char *name;  // the first operand; NULL: the command has this action alone
     const char *takes; // its operands, for a message
     // A letter for each operand: i an id, s SLUG, r SLUG or SLUG@REVISION, v SLUG@REVISION,
-    // n a whole number from 1, t a text, f a file; those behind "?" may be missing.
+    // n a whole number from 1, t the name of a record, p a part of a result, f a file; those behind
+    // "?" may be missing.
     const char *operands;
     Status (*act)(ApiCall *call, Problem *problem); // such as api_show
     // The request of the action, for api_send and api_show.
@@ -61,6 +62,7 @@ struct ApiCall {
     char *url;
     char token[640]; // "": none
     bool is_loopback, is_tls;
+    long answer_ms;      // that an answer may take; 0: the usual
     int64_t until_ns;    // monotonic; end of the wait
     char id[96];         // of the job that was sent
     Bytes body;          // of the next POST
@@ -84,6 +86,13 @@ typedef struct ApiRequest {
 // of a failure on stderr; returns the exit code.
 int api_command(const Command *self, void *settings, const Options *options, Problem *problem);
 
+// The letter of an operand of an action; '\0' if it takes fewer.
+char api_operand_kind(const ApiAction *action, size_t index);
+// For completion: prints members of the objects of the list in the answer to `path`; nothing
+// without an answer in 0.3 s. `names` ends with NULL.
+void api_print_members(const Command *self, void *settings, const char *path, const char *list,
+                       const char *const *names);
+
 // Prepares the call of the settings; connects to nothing yet. From here on Ctrl-C ends the program
 // with 130. STATUS_USAGE says what is wrong with the URL or the token. api_close in any case.
 Status api_open(ApiCall *call, Problem *problem);
@@ -100,7 +109,9 @@ Status api_ask(ApiCall *call, ApiRequest *request, Problem *problem);
 Status api_get(ApiCall *call, Bytes path, Problem *problem);
 // Sends the request of the action.
 Status api_send(ApiCall *call, Problem *problem);
-// The same, and prints all pages of the answer.
+// The same, and adds up to `more` pages that follow to the answer.
+Status api_send_pages(ApiCall *call, size_t more, Problem *problem);
+// Sends the request and prints all pages of the answer.
 Status api_show(ApiCall *call, Problem *problem);
 // Writes the body of the answer to a file, completely or not at all; NULL: to standard output.
 Status api_download(ApiCall *call, ApiRequest *request, const char *path, Problem *problem);

@@ -1,17 +1,76 @@
-// The list of subcommands, --help and version.
+// The list of subcommands, and those on the program itself: help, examples, cite, version.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/base/spelling.h"
-#include "core/simulation/simulation.h"
+#include "core/study/study.h"
 #include "server/api/app.h"
-#include "server/cli/command.h"
+#include "server/cli/client.h"
+#include "server/cli/files.h"
+#include "server/json/parse.h"
+#include "server/json/table.h"
 #include "server/options.h"
+#include "server/util/embedded.h"
 
 static int help_run(const Command *self, void *settings, const Options *options, Problem *problem);
 static int version_run(const Command *self, void *settings, const Options *options,
                        Problem *problem);
+static int examples_run(const Command *self, void *settings, const Options *options,
+                        Problem *problem);
+static int cite_run(const Command *self, void *settings, const Options *options, Problem *problem);
+static int complete_run(const Command *self, void *settings, const Options *options,
+                        Problem *problem);
+
+typedef struct ExamplesSettings {
+    char *output;
+    bool json;
+} ExamplesSettings;
+
+static const Field examples_fields[] = {
+    FIELD_TEXT(ExamplesSettings, output, 4000, PRESENCE_OPTIONAL, 0,
+               "write the example to this file (standard output)"),
+    FIELD_FLAG(ExamplesSettings, json, false, "print the list as JSON"),
+    FIELD_END,
+};
+
+static const Command command_examples = {
+    .name = "examples",
+    .operands = "[NAME]",
+    .summary = "list example scenes, or print one",
+    .help = "  impactd examples                                   all names and titles\n"
+            "  impactd examples paper_free_sponge                 print this scene\n"
+            "  impactd examples paper_free_sponge -o scene.json   write it to a file\n"
+            "  impactd examples paper_free_sponge | impactd run -\n",
+    .options = examples_fields,
+    .size = sizeof(ExamplesSettings),
+    .run = examples_run,
+};
+
+static const Field cite_fields[] = {
+    {.name = "bibtex", .kind = FIELD_KIND_FLAG, .doc = "print entries for BibTeX"},
+    FIELD_END,
+};
+
+static const Command command_cite = {
+    .name = "cite",
+    .summary = "show how to cite impactd and its model",
+    .help = "  impactd cite\n"
+            "  impactd cite --bibtex >> references.bib\n",
+    .options = cite_fields,
+    .size = sizeof(bool),
+    .run = cite_run,
+};
+
+// For the completion of shells; in no list.
+static const Command command_complete = {
+    .name = "complete",
+    .operands = "ids|materials|records|examples",
+    .summary = "print names for the completion of a shell",
+    .help = "  impactd complete ids\n",
+    .size = sizeof(ClientSettings),
+    .run = complete_run,
+};
 
 static const Command command_help = {
     .name = "help",
@@ -28,19 +87,16 @@ static const Command command_version = {
 };
 
 const Command *const commands[] = {
-    &command_run,       &command_check,
-    &command_sweep,     &command_ensemble,
-    &command_tradeoff,  &command_optimize,
-    &command_calibrate, &command_response,
-    &command_fragility, &command_study,
-    &command_import,    &command_serve,
-    &command_token,     &command_backup,
-    &command_restore,   &command_check_db,
-    &command_submit,    &command_watch,
-    &command_get,       &command_compare,
-    &command_cancel,    &command_materials,
-    &command_records,   &command_help,
-    &command_version,   NULL,
+    &command_run,       &command_check,    &command_sweep,
+    &command_ensemble,  &command_tradeoff, &command_optimize,
+    &command_calibrate, &command_response, &command_fragility,
+    &command_study,     &command_import,   &command_examples,
+    &command_serve,     &command_token,    &command_backup,
+    &command_restore,   &command_check_db, &command_submit,
+    &command_jobs,      &command_watch,    &command_get,
+    &command_compare,   &command_cancel,   &command_open,
+    &command_materials, &command_records,  &command_help,
+    &command_cite,      &command_version,  NULL,
 };
 
 const OptionGroup command_groups[] = {
@@ -77,7 +133,17 @@ const Command *command_find(const char *name) {
     for (size_t i = 0; commands[i] != NULL; i++)
         if (strcmp(commands[i]->name, name) == 0)
             return commands[i];
-    return NULL;
+    return strcmp(name, command_complete.name) == 0 ? &command_complete : NULL;
+}
+
+enum { EXAMPLE_NAME = 64, EXAMPLES_MAX = 200 };
+
+// "paper_free_sponge" of "schema/examples/paper_free_sponge.json".
+static const char *example_name(const EmbeddedFile *file, char name[EXAMPLE_NAME]) {
+    const char *slash = strrchr(file->path, '/');
+    const char *from = slash != NULL ? slash + 1 : file->path;
+    snprintf(name, EXAMPLE_NAME, "%.*s", (int)strcspn(from, "."), from);
+    return name;
 }
 
 static void overview_print(FILE *file) {
@@ -130,6 +196,103 @@ static int version_run(const Command *self, void *settings, const Options *optio
                        Problem *problem) {
     (void)self, (void)settings, (void)options, (void)problem;
     printf("impactd %s (engine %s)\n", program_version, engine_version);
+    return COMMAND_OK;
+}
+
+// Prints the names and titles of all examples.
+static Status examples_print(bool is_json, Problem *problem) {
+    static const PrintTableView view = {NULL, NULL, NULL};
+    Bytes json = {0};
+    Status status = STATUS_OK;
+    bytes_text(&json, "{\"examples\": [");
+    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++) {
+        StudyRequest scene;
+        char name[EXAMPLE_NAME];
+        (void)json_parse(file->bytes, file->size, study_request_fields, &scene, NULL);
+        bytes_json(&json, "%p{\"name\": %s, \"title\": %s}", file != embedded_examples ? ", " : "",
+                   example_name(file, name), scene.simulation.title);
+        study_request_clear(&scene);
+    }
+    bytes_text(&json, "]}\n");
+    if (is_json && !json.is_failed)
+        fputs(json.at, stdout);
+    else
+        status = command_print_tables(&json, &view, NULL, problem);
+    bytes_clear(&json);
+    return status;
+}
+
+static int examples_run(const Command *self, void *of, const Options *options, Problem *problem) {
+    const ExamplesSettings *settings = of;
+    const char *wanted = options->operand_count > 0 ? options->operands[0] : NULL;
+    const char *names[EXAMPLES_MAX + 1] = {NULL};
+    char known[EXAMPLES_MAX][EXAMPLE_NAME];
+    if (wanted == NULL)
+        return command_end(self, examples_print(settings->json, problem), problem);
+    for (size_t i = 0; i < EXAMPLES_MAX && embedded_examples[i].path != NULL; i++) {
+        names[i] = example_name(&embedded_examples[i], known[i]);
+        if (strcmp(names[i], wanted) == 0)
+            return command_end(
+                self,
+                output_put(settings->output,
+                           &(Bytes){.at = (char *)(uintptr_t)embedded_examples[i].bytes,
+                                    .count = embedded_examples[i].size},
+                           problem),
+                problem);
+    }
+    const char *near = spelling_nearest(names, wanted);
+    return command_end(self,
+                       problem_set(problem, STATUS_NOT_FOUND, "there is no example \"%.60s\"%s%s%s",
+                                   wanted, near != NULL ? " (did you mean " : "",
+                                   near != NULL ? near : "", near != NULL ? "?)" : ""),
+                       problem);
+}
+
+static int cite_run(const Command *self, void *settings, const Options *options, Problem *problem) {
+    (void)self, (void)options, (void)problem;
+    if (!*(const bool *)settings)
+        printf("The program: impactd %s (engine %s), simulation of structures with impact\n"
+               "dampers.\n"
+               "\n"
+               "Its model: K. Li and A. P. Darby, Modelling a buffered impact damper system\n"
+               "using a spring-damper model of impact, Structural Control and Health\n"
+               "Monitoring 16 (2009) 287-302, doi:10.1002/stc.238.\n",
+               program_version, engine_version);
+    else
+        printf("@software{impactd,\n"
+               "  title   = {impactd: simulation of structures with impact dampers},\n"
+               "  version = {%s, engine %s}\n"
+               "}\n"
+               "@article{LiDarby2009,\n"
+               "  author  = {Li, Kuinian and Darby, Antony P.},\n"
+               "  title   = {Modelling a buffered impact damper system using a spring-damper\n"
+               "             model of impact},\n"
+               "  journal = {Structural Control and Health Monitoring},\n"
+               "  volume  = {16},\n"
+               "  pages   = {287--302},\n"
+               "  year    = {2009},\n"
+               "  doi     = {10.1002/stc.238}\n"
+               "}\n",
+               program_version, engine_version);
+    return COMMAND_OK;
+}
+
+static int complete_run(const Command *self, void *settings, const Options *options,
+                        Problem *problem) {
+    static const struct {
+        const char *kind, *path, *list, *names[3];
+    } rows[] = {{"ids", "/v1/jobs?limit=100", "jobs", {"id", "result", NULL}},
+                {"materials", "/v1/materials?limit=1000", "materials", {"slug", NULL}},
+                {"records", "/v1/records?limit=500", "records", {"name", NULL}}};
+    const char *kind = options->operand_count > 0 ? options->operands[0] : "";
+    char name[EXAMPLE_NAME];
+    (void)problem;
+    for (size_t i = 0; i < COUNT(rows); i++)
+        if (strcmp(kind, rows[i].kind) == 0)
+            api_print_members(self, settings, rows[i].path, rows[i].list, rows[i].names);
+    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
+        if (strcmp(kind, "examples") == 0)
+            puts(example_name(file, name));
     return COMMAND_OK;
 }
 

@@ -1,11 +1,17 @@
-// The commands on jobs and results of a server: submit, watch, get, cancel, compare.
+// The commands on jobs and results of a server: submit, jobs, watch, get, cancel, compare, open.
+#include <fcntl.h>
 #include <poll.h>
+#include <spawn.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/base/rfc3339.h"
 #include "server/cli/client.h"
 #include "server/cli/files.h"
+#include "server/jobs/job.h"
 #include "server/json/document.h"
 #include "server/util/clock.h"
 
@@ -142,7 +148,7 @@ static Status job_follow(ApiCall *call, const char *id, FILE *lines, Problem *pr
     return status;
 }
 
-// Options of all five commands; each has rows for those that it takes.
+// Options of all these commands; each has rows for those that it takes.
 typedef struct JobsSettings {
     ClientSettings client;
     bool dry_run;
@@ -151,6 +157,10 @@ typedef struct JobsSettings {
     char *output, *channels;
     double from, to;
     uint64_t points, max_bytes;
+    char *q;
+    int status; // CHOICE_ABSENT: any
+    uint64_t limit;
+    bool all;
 } JobsSettings;
 
 static bool text_is_printable(const char *text) {
@@ -218,6 +228,102 @@ static Status cancel_act(ApiCall *call, Problem *problem) {
     TRY(api_send(call, problem));
     TRY(job_read(call, problem));
     printf("%s %s\n", job_text(call, "id"), job_text(call, "status"));
+    return STATUS_OK;
+}
+
+enum { PAGE_JOBS = 100 }; // of one answer, at most
+
+// A time in words: "5 s", "3 min", "2 h", "4 d".
+static void age_put(Bytes *json, double seconds) {
+    static const struct {
+        double size;
+        const char *name;
+    } units[] = {{86400, "d"}, {3600, "h"}, {60, "min"}, {1, "s"}};
+    size_t i = 0;
+    while (i + 1 < COUNT(units) && seconds < units[i].size)
+        i++;
+    bytes_format(json, "\"%.0f %s\"", floor(fmax(seconds, 0) / units[i].size), units[i].name);
+}
+
+// One row of the table. The time is that of the run, or how much of it is done.
+static void jobs_put(const JsonDocument *job, Bytes *json) {
+    const char *status = json_get_text(job, "status"), *created = json_get_text(job, "created");
+    const double run = json_get_number(json_get_object(job, "timing"), "run");
+    int64_t created_ms = 0;
+    bytes_json(json, "{\"id\": %s, \"status\": %s, \"age\": ", json_get_text(job, "id"), status);
+    if (created != NULL && rfc3339_read(created, &created_ms))
+        age_put(json, 1e-3 * (double)(clock_unix_ms() - created_ms));
+    else
+        bytes_text(json, "null");
+    if (status != NULL && strcmp(status, "running") == 0)
+        bytes_format(json, ", \"time\": \"%.0f %%\"", json_get_number(job, "progress"));
+    else if (!isnan(run))
+        bytes_format(json, ", \"time\": \"%.3g %s\"", run < 1 ? 1e3 * run : run,
+                     run < 1 ? "ms" : "s");
+    bytes_json(json, ", \"title\": %s}", json_get_text(job, "title"));
+}
+
+static Status jobs_act(ApiCall *call, Problem *problem) {
+    const JobsSettings *settings = call->settings;
+    const size_t limit = settings->all ? SIZE_MAX : settings->limit;
+    char path[40];
+    ApiAction action = *call->action;
+    Bytes json = {0};
+    const JsonDocument *job;
+    size_t count = 0;
+    snprintf(path, sizeof path, "/v1/jobs?limit=%zu", limit < PAGE_JOBS ? limit : PAGE_JOBS);
+    action.path = path;
+    call->action = &action;
+    TRY(api_send_pages(call, (limit - 1) / PAGE_JOBS, problem));
+    if (settings->client.json) {
+        api_print(call);
+        return STATUS_OK;
+    }
+    (void)api_reply(call);
+    bytes_text(&json, "{\"jobs\": [");
+    for (; count < limit && (job = json_get_item(call->reply, "jobs", count)) != NULL; count++) {
+        bytes_text(&json, count > 0 ? ", " : "");
+        jobs_put(job, &json);
+    }
+    bytes_text(&json, "]}");
+    const bool is_more = call->answer.next[0] != '\0' || json_get_item(call->reply, "jobs", count);
+    bytes_clear(&call->answer.body);
+    call->answer.body = json;
+    TRY(api_print_tables(call, problem));
+    if (is_more)
+        fprintf(stderr, "impactd jobs: these are the newest %zu; --limit N or --all shows more\n",
+                count);
+    return STATUS_OK;
+}
+
+// Opens an address in the browser of the desktop, if there is one.
+static bool browser_open(const char *url) {
+    extern char **environ;
+    const char *const arguments[] = {"xdg-open", url, NULL};
+    posix_spawn_file_actions_t actions;
+    pid_t child = 0;
+    int code = 0;
+    if (getenv("DISPLAY") == NULL && getenv("WAYLAND_DISPLAY") == NULL)
+        return false;
+    if (posix_spawn_file_actions_init(&actions) != 0)
+        return false;
+    // What a browser prints does not belong on this terminal.
+    for (int number = STDIN_FILENO; number <= STDERR_FILENO; number++)
+        (void)posix_spawn_file_actions_addopen(&actions, number, "/dev/null", O_RDWR, 0);
+    const bool is_started = posix_spawnp(&child, arguments[0], &actions, NULL,
+                                         (char *const *)(uintptr_t)arguments, environ) == 0;
+    (void)posix_spawn_file_actions_destroy(&actions);
+    return is_started && waitpid(child, &code, 0) == child && code == 0;
+}
+
+static Status open_act(ApiCall *call, Problem *problem) {
+    const char *id = call->count > 0 ? call->operands[0] : "";
+    const char *page = call->count == 0 ? "" : strncmp(id, "j-", 2) == 0 ? "#/jobs/" : "#/results/";
+    char url[2200];
+    (void)problem;
+    snprintf(url, sizeof url, "%.2000s/%s%.100s", call->url, page, id);
+    (void)browser_open(url);
+    printf("%s\n", url);
     return STATUS_OK;
 }
 
@@ -350,6 +456,20 @@ static const Field cancel_fields[] = {
     CLIENT_ROWS,
     FIELD_END,
 };
+static const Field jobs_fields[] = {
+    CLIENT_ROWS,
+    FIELD_CHOICE(JobsSettings, status, job_state_names, OPTIONAL, "only jobs of this status: accepted, running, successful, failed or dismissed"),
+    FIELD_TEXT(JobsSettings, q, 200, PRESENCE_OPTIONAL, 0, "only jobs with these words in title, labels or id"),
+    FIELD_COUNT(JobsSettings, limit, NULL, WITHIN(1, 1e6), 20, "how many, the newest first (20)"),
+    FIELD_FLAG(JobsSettings, all, false, "all jobs"),
+    FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for a busy server (0)"),
+    FIELD_FLAG(ClientSettings, json, false, "print the answer of the server as JSON"),
+    FIELD_END,
+};
+static const Field open_fields[] = {
+    CLIENT_ROWS,
+    FIELD_END,
+};
 static const Field compare_fields[] = {
     CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 60, "how long to wait for an unfinished job and a busy server"),
@@ -379,6 +499,45 @@ const Command command_submit = {
     .size = sizeof(JobsSettings),
     .run = api_command,
     .actions = &(const ApiAction){.takes = "one scene", .operands = "f", .act = submit_act},
+};
+
+static const PrintTableView jobs_view = {
+    .lists = (const PrintTableColumns[]){{"jobs", {"id", "status", "age", "time", "title"}},
+                                         {NULL, {NULL}}}};
+
+const Command command_jobs = {
+    .name = "jobs",
+    .summary = "list the jobs of a server",
+    .help = "  impactd jobs                          the 20 newest jobs\n"
+            "  impactd jobs --status failed --all    all jobs that failed\n"
+            "  impactd jobs --q sponge --limit 100   jobs with this word\n"
+            "  impactd jobs --json                   as JSON, for programs\n"
+            "\n"
+            "The column time has the duration of the run or, of a running job, its progress.\n",
+    .options = jobs_fields,
+    .size = sizeof(JobsSettings),
+    .run = api_command,
+    .actions =
+        &(const ApiAction){
+            .takes = "no operands", .operands = "", .act = jobs_act, .query = "status q"},
+    .view = &jobs_view,
+};
+
+const Command command_open = {
+    .name = "open",
+    .operands = "[ID]",
+    .summary = "show the dashboard, a job or a result in the browser",
+    .help = "  impactd open           the dashboard of the server\n"
+            "  impactd open j-7f3a    a job\n"
+            "  impactd open r-91c0    a result\n"
+            "\n"
+            "Prints the address. Without a graphical display nothing is opened.\n",
+    .options = open_fields,
+    .size = sizeof(JobsSettings),
+    .run = api_command,
+    .actions = &(const ApiAction){.takes = "the id of a job or a result, like j-7f3a, or nothing",
+                                  .operands = "?i",
+                                  .act = open_act},
 };
 
 const Command command_watch = {
@@ -424,7 +583,7 @@ const Command command_get = {
     .run = api_command,
     .actions =
         &(const ApiAction){.takes = "the id of a result or a job, like r-91c0, and a part of it",
-                           .operands = "i?f",
+                           .operands = "i?p",
                            .act = get_act},
 };
 

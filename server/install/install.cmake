@@ -34,7 +34,7 @@ add_custom_command(OUTPUT ${GUIDE_PAGES} ${GUIDE_COPIES}
 impactd_embed(impactd guide ${CMAKE_BINARY_DIR} ${GUIDE_PAGES} ${GUIDE_COPIES})
 
 install(TARGETS impactd RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(FILES ${PAGES}/impactd.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+install(DIRECTORY ${PAGES}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 FILES_MATCHING PATTERN "*.1" PATTERN deb EXCLUDE)
 install(FILES ${PAGES}/impactd-scene.5 DESTINATION ${CMAKE_INSTALL_MANDIR}/man5)
 install(FILES server/install/impactd.service.8 DESTINATION ${CMAKE_INSTALL_MANDIR}/man8)
 install(FILES ${PAGES}/impactd.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME impactd)

@@ -1,5 +1,6 @@
 // print_pages DIRECTORY: the manual pages, the bash completion and parts of the guide, printed from
 // the tables of the program. A tool of the build, not part of the program.
+#include <ctype.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -7,7 +8,7 @@
 #include "core/base/field.h"
 #include "core/study/study.h"
 #include "server/api/app.h"
-#include "server/cli/command.h"
+#include "server/cli/client.h"
 #include "server/install/guide_parts.h"
 #include "server/options.h"
 
@@ -67,7 +68,7 @@ static void option_print(FILE *file, const Field *row) {
 
 // The lines before the first empty one are examples, the others are text.
 static void help_print(FILE *file, const char *help) {
-    fputs(".PP\n.EX\n", file);
+    fputs(".EX\n", file);
     bool is_example = true;
     for (; *help != '\0'; help += strcspn(help, "\n") + 1) {
         char line[512];
@@ -98,22 +99,25 @@ static const char front[] =
     "see\n"
     ".BR impactd\\-scene (5).\n"
     "The results are the motion, all impacts, spectra and an energy balance. Some commands run\n"
-    "simulations themselves, others send them to a server, which\n.B impactd serve\nis.\n"
+    "simulations themselves, others send them to a server, which\n.B impactd serve\nstarts.\n"
+    "Each command has a page of its own.\n"
     ".SH COMMANDS\n";
 
-static const char back[] =
+static const char exits[] =
     ".SH EXIT STATUS\n"
     ".TP\n0\nok\n.TP\n1\nfailed\n.TP\n2\nusage\n.TP\n3\nfaulty scene or file\n.TP\n4\nnot found\n"
     ".TP\n5\npermission denied\n.TP\n7\nthe server cannot be reached, or is too busy\n"
-    ".TP\n8\nthe job has not finished after \\-\\-wait\n.TP\n130\ninterrupted\n"
+    ".TP\n8\nthe job has not finished after \\-\\-wait\n.TP\n130\ninterrupted\n";
+
+static const char back[] =
     ".SH ENVIRONMENT\n"
-    ".TP\n.B IMPACTD_SERVER\nURL of the server for submit, watch, get, cancel, compare, records "
-    "and materials.\n"
+    ".TP\n.B IMPACTD_SERVER\nURL of the server, for the commands that ask one.\n"
     ".TP\n.BR IMPACTD_TOKEN , \" IMPACTD_TOKEN_FILE\"\nThe bearer token for it, or a file with "
     "the token that only its owner can read.\n"
     ".TP\n.B IMPACTD_CA_FILE\nCertificates to trust.\n"
     ".TP\n.BI IMPACTD_ NAME\nA setting of\n.BR \"impactd serve\" :\nIMPACTD_MAX_BODY is "
     "\\-\\-max\\-body.\n"
+    ".TP\n.B NO_COLOR\nNo colours on a terminal, if it is set.\n"
     ".SH FILES\n"
     ".TP\n.I $XDG_STATE_HOME/impactd\nThe database of the server, unless \\-\\-data names another "
     "directory; else under\n.IR \\(ti/.local/state .\n"
@@ -122,20 +126,42 @@ static const char back[] =
     ".SH SEE ALSO\n"
     ".BR impactd\\-scene (5),\n.BR impactd.service (8)\n";
 
+static void manual_command(FILE *file, const Command *command) {
+    char title[64] = "IMPACTD\\-";
+    for (const char *c = command->name; *c != '\0'; c++)
+        snprintf(strchr(title, '\0'), 4, "%s%c", *c == '-' ? "\\" : "", toupper((unsigned char)*c));
+    head(file, title, "1");
+    fputs(".SH NAME\nimpactd\\-", file);
+    escaped(file, command->name, false);
+    fputs(" \\- ", file);
+    escaped(file, command->summary, false);
+    fputs("\n.SH SYNOPSIS\n.B impactd ", file);
+    escaped(file, command->name, false);
+    fputs(command->options != NULL ? "\n[\\fIOPTION\\fR]...\n" : "\n", file);
+    escaped(file, command->operands != NULL ? command->operands : "", true);
+    fputs(command->operands != NULL ? "\n.SH EXAMPLES\n" : ".SH EXAMPLES\n", file);
+    help_print(file, command->help);
+    if (command->options != NULL)
+        fputs(".SH OPTIONS\n", file);
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++)
+        option_print(file, row);
+    fprintf(file, "%s.SH SEE ALSO\n.BR impactd (1),\n.BR impactd\\-scene (5)\n", exits);
+}
+
 static void manual_program(FILE *file) {
     head(file, "IMPACTD", "1");
     fputs(front, file);
+    const OptionGroup *group = command_groups;
     for (size_t i = 0; commands[i] != NULL; i++) {
-        const Command *command = commands[i];
-        fprintf(file, ".SS \"impactd %s%s%s\"\n", command->name,
-                command->operands != NULL ? " " : "",
-                command->operands != NULL ? command->operands : "");
-        escaped(file, command->summary, true);
-        fputs(".\n", file);
-        help_print(file, command->help);
-        for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++)
-            option_print(file, row);
+        if (group->first != NULL && strcmp(group->first, commands[i]->name) == 0)
+            fprintf(file, ".SS %s\n", group++->title);
+        fputs(".TP\n.BR impactd\\-", file);
+        escaped(file, commands[i]->name, false);
+        fputs(" (1)\n", file);
+        escaped(file, commands[i]->summary, true);
+        fputc('\n', file);
     }
+    fputs(exits, file);
     fputs(back, file);
 }
 
@@ -212,71 +238,123 @@ static void manual_scene(FILE *file) {
 // Parts of a result for `impactd get`.
 static const char parts[] =
     "result series psd impacts energy manifest bundle job tradeoff ensemble compare sensitivity "
-    "table";
+    "table calibration response optimum fragility";
 
 static void names_print(FILE *file) {
     for (size_t i = 0; commands[i] != NULL; i++)
         fprintf(file, "%s%s", i > 0 ? " " : "", commands[i]->name);
 }
 
-// The words that an operand may be: the actions of "create|list [NAME]", commands or parts.
-static void completion_operands(FILE *file, const char *operands) {
+// The kind of names that an operand is one of, for `impactd complete`; "file" or "file.json".
+static const char *operand_names(const Command *command, char letter) {
+    const bool is_scene = command->operands != NULL && strstr(command->operands, ".json") != NULL;
+    return letter == 'i'                     ? "ids"
+           : letter == 't'                   ? "records"
+           : letter == 'p'                   ? "parts"
+           : letter == 'f' || letter == '\0' ? is_scene ? "file.json" : "file"
+                                             : "materials";
+}
+
+// Sets `kind` from the number of operands before the cursor and from the action.
+static void completion_operands(FILE *file, const Command *command) {
+    const char *operands = command->operands != NULL ? command->operands : "";
     const size_t length = strcspn(operands, " ");
-    const bool is_action = memchr(operands, '|', length) != NULL;
-    const bool is_part = strstr(operands, "WHAT") != NULL;
-    if (!is_action && !is_part && strstr(operands, "COMMAND") == NULL)
-        return;
-    fprintf(file, "        *) [ \"$COMP_CWORD\" -ne %d ] || words='", is_part ? 3 : 2);
-    if (is_action)
+    const ApiAction *action = command->actions;
+    fputs("        [ -n \"$option\" ] || case $count.$action in\n", file);
+    if (memchr(operands, '|', length) != NULL) {
+        fputs("        0.*) words='", file);
         for (size_t i = 0; i < length; i++)
             fputc(operands[i] == '|' ? ' ' : operands[i], file);
-    else if (is_part)
-        fputs(parts, file);
-    else
-        names_print(file);
-    fputs("' ;;\n", file);
+        fputs("' ;;\n", file);
+    } else if (action == NULL && length > 0) {
+        fprintf(file, "        0.*) kind=%s ;;\n",
+                strstr(operands, "COMMAND") != NULL ? "commands"
+                : strstr(operands, "NAME") != NULL  ? "examples"
+                                                    : operand_names(command, '\0'));
+    }
+    for (; action != NULL; action = action->name != NULL ? action + 1 : NULL) {
+        const bool is_alone = action == command->actions && action->name == NULL;
+        if (action->name == NULL && !is_alone)
+            break;
+        for (size_t i = 0; api_operand_kind(action, i) != '\0'; i++)
+            fprintf(file, "        %zu.%s) kind=%s ;;\n", is_alone ? i : i + 1,
+                    is_alone ? "*" : action->name,
+                    operand_names(command, api_operand_kind(action, i)));
+    }
+    fputs("        esac ;;\n", file);
 }
 
 // The words after an option that takes one of some texts, the options, and the operands.
 static void completion_command(FILE *file, const Command *command) {
     char name[OPTION_NAME];
-    fprintf(file, "    %s) case $prev:$cur in\n", command->name);
-    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
-        const char letter = option_spell(row, name);
-        if (row->kind == FIELD_KIND_FLAG)
-            continue;
-        fprintf(file, "        %s:*%s%.*s%s) ", name, letter != '\0' ? " | -" : "",
-                letter != '\0' ? 1 : 0, &letter, letter != '\0' ? ":*" : "");
-        fputs(row->kind == FIELD_KIND_CHOICE ? "words='" : "return ;;\n", file);
-        for (size_t i = 0; row->kind == FIELD_KIND_CHOICE && row->choices[i] != NULL; i++)
-            fprintf(file, "%s ", row->choices[i]);
-        fputs(row->kind == FIELD_KIND_CHOICE ? "' ;;\n" : "", file);
-    }
-    fputs("        *:-*) words='--help", file);
+    fprintf(file, "    %s) options='--help", command->name);
     for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
         (void)option_spell(row, name);
         fprintf(file, " %s", name);
     }
-    fputs("' ;;\n", file);
-    completion_operands(file, command->operands != NULL ? command->operands : "");
-    fputs("        esac ;;\n", file);
+    fputs("'\n        case $option in\n", file);
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
+        const char letter = option_spell(row, name);
+        if (row->kind == FIELD_KIND_FLAG)
+            continue;
+        fprintf(file, "        %s%s%.*s) kind=%s words='", name, letter != '\0' ? " | -" : "",
+                letter != '\0' ? 1 : 0, &letter,
+                strcmp(option_operand(row), "FILE") == 0 || strcmp(option_operand(row), "DIR") == 0
+                    ? "file"
+                    : "value");
+        for (size_t i = 0; row->kind == FIELD_KIND_CHOICE && row->choices[i] != NULL; i++)
+            fprintf(file, "%s ", row->choices[i]);
+        fputs("' ;;\n", file);
+    }
+    fputs("        esac\n", file);
+    completion_operands(file, command);
 }
 
+// In bash, and in zsh after bashcompinit. The first pass over the words before the cursor counts
+// operands: it needs to know which options take a value.
 static void completion_bash(FILE *file) {
     fputs("# bash completion of impactd, printed from its tables.\n"
-          "_impactd() {\n"
-          "    local words= cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD - 1]}\n"
-          "    COMPREPLY=()\n"
-          "    if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
-          "        words='--help --version ",
-          file);
-    names_print(file);
-    fputs("'\n"
-          "    else case ${COMP_WORDS[1]} in\n",
+          "_impactd_command() {\n"
+          "    kind= words=\n"
+          "    case $1 in\n",
           file);
     for (size_t i = 0; commands[i] != NULL; i++)
         completion_command(file, commands[i]);
-    fputs("    esac; fi\n"
+    fputs("    esac\n"
+          "}\n"
+          "_impactd() {\n"
+          "    local kind= words= options= option= count=-1 action= word i\n"
+          "    local cur=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]}\n"
+          "    COMPREPLY=()\n"
+          "    for ((i = 1; i < COMP_CWORD; i++)); do\n"
+          "        word=${COMP_WORDS[i]}\n"
+          "        if [ \"$word\" = = ]; then continue; fi\n"
+          "        if [ -n \"$option\" ]; then option= && continue; fi\n"
+          "        case $word in\n"
+          "        -*) option=$word && _impactd_command \"$command\"\n"
+          "            [ -n \"$kind\" ] || option= ;;\n"
+          "        *) count=$((count + 1)) && [ \"$count\" -ne 1 ] || action=$word ;;\n"
+          "        esac\n"
+          "    done\n"
+          "    [ \"$cur\" != = ] || cur=\n"
+          "    _impactd_command \"$command\"\n"
+          "    if [ \"$COMP_CWORD\" -eq 1 ]; then kind=commands words='--help --version'\n"
+          "    elif [ -z \"$option\" ] && [ \"${cur:0:1}\" = - ]; then kind= words=$options; fi\n"
+          "    case $kind in\n"
+          "    '' | value) ;;\n"
+          "    file) return ;;\n"
+          "    file.*) mapfile -t COMPREPLY < <(compgen -f -X \"!*.${kind#file.}\" -- \"$cur\"\n"
+          "            compgen -d -S / -- \"$cur\")\n"
+          "        compopt -o nospace 2>/dev/null\n"
+          "        return ;;\n"
+          "    parts) words='",
+          file);
+    fputs(parts, file);
+    fputs("' ;;\n    commands) words=\"$words ", file);
+    names_print(file);
+    fputs("\" ;;\n"
+          "    *) words=$(\"${COMP_WORDS[0]}\" complete \"$kind\" 2>/dev/null) ;;\n"
+          "    esac\n"
           "    mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$cur\")\n"
           "}\n"
           "complete -o default -F _impactd impactd\n",
@@ -292,20 +370,32 @@ static const struct {
     {"scene.md", part_scene},          {"api.md", part_api},
 };
 
-int main(int argc, char **argv) {
+static FILE *page_open(const char *folder, const char *name) {
     char path[4096];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "w");
+    if (file == NULL)
+        perror(path);
+    return file;
+}
+
+int main(int argc, char **argv) {
+    FILE *file;
     for (size_t i = 0; argc == 2 && i < COUNT(pages); i++) {
-        snprintf(path, sizeof path, "%s/%s", argv[1], pages[i].name);
-        FILE *file = fopen(path, "w");
-        if (file == NULL) {
-            perror(path);
+        if ((file = page_open(argv[1], pages[i].name)) == NULL)
             return 1;
-        }
         pages[i].print(file);
-        if (fclose(file) != 0) {
-            perror(path);
+        if (fclose(file) != 0)
             return 1;
-        }
+    }
+    for (size_t i = 0; argc == 2 && commands[i] != NULL; i++) {
+        char name[64];
+        snprintf(name, sizeof name, "impactd-%s.1", commands[i]->name);
+        if ((file = page_open(argv[1], name)) == NULL)
+            return 1;
+        manual_command(file, commands[i]);
+        if (fclose(file) != 0)
+            return 1;
     }
     return argc == 2 ? 0 : 2;
 }

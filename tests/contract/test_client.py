@@ -40,6 +40,35 @@ def test_submit_prints_the_job_and_waits_for_it():
         assert code == 0 and json.loads(out)["dry_run"] is True, (code, out, errors)
 
 
+def test_jobs_lists_and_open_names_the_page():
+    """jobs prints the newest jobs, with --all every page of them; open prints the address of a page."""
+    with program.daemon() as daemon:
+        scene = program.scene("no_damper")
+        ids = [program.finished(daemon, {**scene, "title": f"number {i}", "duration": 1 + i})["id"] for i in range(3)]
+        code, out, errors = client(daemon.url, "jobs")
+        lines = out.splitlines()
+        assert code == 0 and errors == "" and lines[0].split() == ["id", "status", "age", "time", "title"], (out, errors)
+        assert [line.split()[0] for line in lines[1:]] == ids[::-1] and lines[1].endswith("number 2"), out
+        assert "successful" in lines[1] and " s " in lines[1] and " ms " in lines[1], out
+        code, out, errors = client(daemon.url, "jobs", "--limit", "2")
+        assert code == 0 and out.count("j-") == 2 and "--all shows more" in errors, (out, errors)
+        for options, count in ((("--all",), 3), (("-j", "--limit=1"), 1), (("--status", "failed"), 0), (("--q", "number 1"), 1)):
+            code, out, _ = client(daemon.url, "jobs", *options)
+            assert code == 0 and len(re.findall(r'^j-|"id": "j-', out, re.M)) == count, (options, out)
+        assert client(daemon.url, "jobs", "--status", "done")[0] == 2
+    pages = [say(body=json.dumps({"jobs": [{"id": f"j-{page}{i:02}", "status": "running", "progress": 5} for i in range(100)]}).encode(),
+                 Link=f'</v1/jobs?before={page}>; rel="next"' if page < 2 else "") for page in range(3)]
+    for options, count in ((("--limit", "150"), 150), (("--all",), 300), (("--limit", "100"), 100)):
+        with fake(*pages) as (url, seen):
+            code, out, _ = client(url, "jobs", *options)
+            assert code == 0 and out.count("j-") == count and out.count("running") == count and "5 %" in out, (options, out)
+            assert seen[0][1] == "/v1/jobs?limit=100" and len(seen) == (count + 99) // 100, seen
+    plain = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    for arguments, page in (((), ""), (("j-1",), "#/jobs/j-1"), (("r-2",), "#/results/r-2")):
+        done = program.run("open", *arguments, "--server", "https://sim.example/x/", environment=plain)
+        assert done == (0, f"https://sim.example/x/{page}\n", ""), done
+
+
 def test_a_title_and_labels_change_no_number():
     """A scene sent with --title has the result it has without."""
     with program.daemon() as daemon:

@@ -52,6 +52,22 @@ def test_a_letter_has_one_meaning():
     assert code == 2 and "-m is not an option" in errors, errors
 
 
+def test_examples_and_citations():
+    """examples lists and prints the scenes of the program; cite names the program, its version and the paper."""
+    code, out, errors = program.run("examples")
+    assert code == 0 and [line.split()[0] for line in out.splitlines()[1:]] == program.examples(), (code, out, errors)
+    assert [row["name"] for row in json.loads(program.run("examples", "--json")[1])["examples"]] == program.examples()
+    with open(SPONGE, encoding="utf-8") as file:
+        assert program.run("examples", "paper_free_sponge") == (0, file.read(), "")
+    code, _, errors = program.run("examples", "paper_fre_sponge")
+    assert code == 4 and "did you mean paper_free_sponge?" in errors, errors
+    version = program.run("version")[1].split()[1]
+    for option in ((), ("--bibtex",)):
+        code, out, _ = program.run("cite", *option)
+        assert code == 0 and version in out and "10.1002/stc.238" in out and "Darby" in out, out
+    assert out.count("{") == out.count("}") and out.count("\n@") == 1, out
+
+
 def test_set_gives_members_other_values_with_units():
     """--set makes the scene that has these values in its text; a faulty path, value or unit names the option."""
     scene = {**program.scene("paper_free_sponge"), "duration": 5}

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import package  # noqa: E402
@@ -61,25 +62,31 @@ def test_the_installed_program_runs_from_there():
 
 
 def test_the_manual_is_well_formed_and_whole():
-    """mandoc finds no fault in any page, man shows them, and every command and option stands in the first."""
+    """mandoc finds no fault in any page, man shows them, and every command has one with all its options."""
     need("mandoc", "man")
     with installed() as root:
-        pages = [os.path.join(root, "opt/x/share/man", manual) for manual in MANUALS]
+        folder = os.path.join(root, "opt/x/share/man/man1")
+        pages = [os.path.join(folder, name) for name in sorted(os.listdir(folder))]
+        pages += [os.path.join(root, "opt/x/share/man", manual) for manual in MANUALS[1:]]
+        assert len(pages) == len(commands()) + 3, pages
         done = subprocess.run(["mandoc", "-Tlint", "-Wwarning", *pages], capture_output=True, text=True, check=False)
         faults = [line for line in done.stdout.splitlines()
                   if "WARNING" in line and "missing date" not in line or "ERROR" in line]
         assert not faults, faults
-        for page in pages:
+        for page in [pages[0], *pages[-2:]]:
             shown = subprocess.run(["man", "-l", page], capture_output=True, text=True, check=False,
                                    env={**os.environ, "MANPAGER": "cat", "MANWIDTH": "200", "LC_ALL": "C.UTF-8"})
             assert shown.returncode == 0 and len(shown.stdout) > 500, (page, shown)
-        text = subprocess.run(["mandoc", "-Tascii", "-Owidth=200", pages[0]], capture_output=True, text=True, check=True).stdout
-        text = re.sub(r".\x08", "", text)
+        shown = {page: re.sub(r".\x08", "", subprocess.run(["mandoc", "-Tascii", "-Owidth=200", page], capture_output=True,
+                                                           text=True, check=True).stdout) for page in pages}
+        overview = shown[os.path.join(folder, "impactd.1")]
         for name, options in commands().items():
+            text = shown[os.path.join(folder, f"impactd-{name}.1")]
+            assert re.search(rf"^ *impactd-{name}\(1\)", overview, re.M), name
             assert re.search(rf"^ *impactd {name}\b", text, re.M), name
             for option in options:
                 assert option in text, (name, option)
-        scene = subprocess.run(["mandoc", "-Tascii", pages[1]], capture_output=True, text=True, check=True).stdout
+        scene = subprocess.run(["mandoc", "-Tascii", pages[-2]], capture_output=True, text=True, check=True).stdout
         scene = re.sub(r".\x08", "", scene)
         for member in ("structure", "dampers[]", "contact", "excitation", "duration", "sample_rate"):
             assert member in scene, member
@@ -88,7 +95,8 @@ def test_the_manual_is_well_formed_and_whole():
 def complete(script, *words):
     """What bash offers for the last of the words."""
     program_text = f'source "{script}"; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _impactd; printf "%s\\n" "${{COMPREPLY[@]}}"'
-    done = subprocess.run(["bash", "-c", program_text, "bash", "impactd", *words], capture_output=True, text=True, check=True)
+    done = subprocess.run(["bash", "-c", program_text, "bash", program.impactd(), *words], capture_output=True, text=True,
+                          check=True, cwd=program.EXAMPLES)
     assert done.stderr == "", done.stderr
     return done.stdout.split()
 
@@ -105,7 +113,19 @@ def test_bash_completes_commands_options_and_values():
         assert complete(script, "tradeoff", "--metric", "imp") == ["impacts"]
         assert complete(script, "get", "r-1", "imp") == ["impacts"]
         assert complete(script, "token", "re") == ["revoke"] and complete(script, "token", "list", "") == []
-        assert complete(script, "run", "--output", "") == [] and complete(script, "run", "") == []
+        assert complete(script, "tradeoff", "-r", "x", "--metric", "=", "imp") == ["impacts"]
+        assert complete(script, "run", "--output", "") == [] and complete(script, "records", "add", "") == []
+        assert complete(script, "run", "--record", "run", "chi") == ["chirp.json"] and "bad/" in complete(script, "run", "")
+        assert complete(script, "examples", "chi") == ["chirp"] and complete(script, "examples", "x", "") == []
+        with program.daemon() as daemon:
+            job = program.finished(daemon, program.scene("no_damper"))
+            os.environ["IMPACTD_SERVER"] = daemon.url
+            assert set(complete(script, "get", "")) == {job["id"], job["result"]}
+            assert complete(script, "compare", "r-1", "r-") == [job["result"]] and complete(script, "watch", "x", "") == []
+            assert complete(script, "materials", "show", "spo") == ["sponge"] and complete(script, "records", "show", "") == []
+        began = time.monotonic()
+        assert complete(script, "get", "j-") == [] and time.monotonic() - began < 5
+        del os.environ["IMPACTD_SERVER"]
         assert set(complete(script, "help", "")) == set(known)
         bound = subprocess.run(["bash", "-c", f'source "{script}"; complete -p impactd'], capture_output=True, text=True, check=True)
         assert "-o default" in bound.stdout and "_impactd" in bound.stdout, bound
