@@ -291,19 +291,25 @@ static int run(const Command *self, void *of, const Options *options, Problem *p
 const Command command_run = {
     .name = "run",
     .operands = "SCENE.json",
-    .summary = "run one scene here, without a server",
-    .help =
-        "  impactd run scene.json                 numbers and charts; piped: the job as JSON\n"
-        "  impactd run scene.json -o report.html  the same as one page, with all details\n"
-        "  impactd run scene.json -o out.csv      write the time series, as a table\n"
-        "  impactd run scene.json -o out.npy      the same for numpy.load; .npz by names\n"
-        "  impactd run scene.json -o out.mat      the same for MATLAB and Octave\n"
-        "  impactd run scene.json -o out.svg      the same as a chart\n"
-        "  impactd run scene.json -o out.json     job, series, impacts and psd in one document\n"
-        "  impactd run - < scene.json             from standard input\n"
-        "\n"
-        "The output appears whole or not at all. Ctrl-C stops at once (exit code 130).\n"
-        "Exit code 3 if the scene has faults, 1 if the run failed.\n",
+    .summary = "run a scene here, without a server",
+    .help = "  impactd run scene.json                   # numbers and charts\n"
+            "  impactd run scene.json --json            # the finished job as JSON\n"
+            "  impactd run scene.json -o report.html    # a page with charts\n"
+            "  impactd run scene.json -o out.csv        # time series; .npy, .npz, .mat, .svg\n"
+            "  impactd run scene.json -o out.json       # job, series, impacts and spectra\n"
+            "  impactd run scene.json --set dampers.0.clearance=10mm\n"
+            "  impactd run scene.json --vary dampers.0.clearance=5mm:30mm:26\n"
+            "  impactd run - < scene.json               # from standard input\n"
+            "\n"
+            "Where standard output is no terminal, the job is printed as JSON. The output\n"
+            "file is written completely or not at all. Ctrl-C stops the run (exit code 130).\n"
+            "Exit code 3 if the scene has faults, 1 if the run failed.\n"
+            "\n"
+            "A path of --set is that of a member, with dots or as a JSON Pointer. A number\n"
+            "may have a unit: mm, cm, m, g, kg, t, us, ms, s, min, Hz, kHz, N, kN, N/m, N/mm,\n"
+            "kN/m, N s/m, mm/s, m/s, m/s^2, cm/s^2 or %. For an acceleration, g is 9.80665\n"
+            "m/s^2. Without a unit it is in SI. Other values are JSON or text; null removes a\n"
+            "member. \"impactd help sweep\" explains --vary.\n",
     .options = run_fields,
     .size = sizeof(RunSettings),
     .run = run,
@@ -382,11 +388,14 @@ const Command command_check = {
     .name = "check",
     .operands = "SCENE.json",
     .summary = "report the faults of a scene, or show its plan",
-    .help = "  impactd check scene.json          all faults, or the plan and its reasons\n"
-            "  impactd check scene.json --json   the plan as JSON\n"
-            "  impactd check - < scene.json      from standard input\n"
+    .help = "  impactd check scene.json                 # all faults, or the plan\n"
+            "  impactd check scene.json --json          # the plan as JSON\n"
+            "  impactd check scene.json --set contact.model=impulse\n"
+            "  impactd check - < scene.json             # from standard input\n"
             "\n"
-            "Runs nothing. Exit code 3 if the scene has faults.\n",
+            "The plan has the choices of the program with their reasons, the stiffness and\n"
+            "damping of each stop, and the estimated cost. Nothing is run. Exit code 3 if the\n"
+            "scene has faults.\n",
     .options = check_fields,
     .size = sizeof(CheckSettings),
     .run = check,
@@ -519,20 +528,6 @@ static Status study_choose(StudyRequest *request, StudySettings *settings, Probl
     return STATUS_OK;
 }
 
-static Status study_check_cost(const StudyRequest *request, double max,
-                               const SimulationLimits *limits, Problem *problem) {
-    Cost cost;
-    if (isnan(max))
-        return STATUS_OK;
-    TRY(study_request_cost(request, limits, &cost, problem));
-    if (cost.cpu_seconds <= max)
-        return STATUS_OK;
-    return problem_add(problem, STATUS_INVALID, "/study",
-                       "would take about %.3g s of CPU in all, at most %g s are allowed by "
-                       "--max-cpu-seconds: %s",
-                       cost.cpu_seconds, max, study_kind(request->study)->shorten);
-}
-
 static Status study_scene(const char *path, const Bytes *text, void *of, Problem *problem) {
     StudySettings *settings = of;
     const double max = settings->max_cpu_seconds;
@@ -547,7 +542,7 @@ static Status study_scene(const char *path, const Bytes *text, void *of, Problem
     if (status == STATUS_OK)
         status = study_request_complete(&request, &limits, NULL, problem);
     if (status == STATUS_OK)
-        status = study_check_cost(&request, max, &limits, problem);
+        status = jobs_limit_study(&request, &limits, max, "--max-cpu-seconds", problem);
     if (status == STATUS_OK)
         status = study_check_outputs(study_kind(request.study), outputs, problem);
     // Before the runs, so that a wrong folder is reported at once.
@@ -585,15 +580,14 @@ static const Field study_fields[] = {
 
 const Command command_study = {
     STUDY_COMMAND("study", NULL, NULL),
-    .summary = "make the study that a scene asks for: compare, sensitivity and the others",
-    .help =
-        "  impactd study scene.json                       the answer as JSON\n"
-        "  impactd study scene.json -o out.svg -o out.csv the chart, and the table\n"
-        "  impactd study - < scene.json                   from standard input\n"
-        "\n"
-        "The scene's member \"study\" says what is wanted, like {\"kind\": \"compare\"} for all\n"
-        "contact models side by side. Ctrl-C stops at once. Exit code 3 if the scene has\n"
-        "faults or no study, 1 if its run failed.\n",
+    .summary = "run the study that a scene asks for",
+    .help = "  impactd study scene.json                          # its result\n"
+            "  impactd study scene.json -o out.svg -o out.csv    # as a chart and a table\n"
+            "  impactd study - < scene.json                      # from standard input\n"
+            "\n"
+            "The scene's member \"study\" describes the study, such as {\"kind\": \"compare\"},\n"
+            "which runs the scene with several contact models. Ctrl-C stops the study. Exit\n"
+            "code 3 if the scene has faults or no study, 1 if a run failed.\n",
     .options = study_fields,
 };
 
@@ -637,20 +631,19 @@ static void tradeoff_choose(void *asked, StudySettings *settings) {
 
 const Command command_tradeoff = {
     STUDY_COMMAND("tradeoff", &study_tradeoff, tradeoff_choose),
-    .summary = "try solvers and steps on a scene: error against CPU time",
-    .help =
-        "  impactd tradeoff scene.json                          the table, and what to take\n"
-        "  impactd tradeoff scene.json --error 1e-6             for a displacement right to 1e-6\n"
-        "  impactd tradeoff scene.json --metric psd --error 0.5 for spectra right to half a dB\n"
-        "  impactd tradeoff scene.json -o out.svg -o out.json   the chart, and the table whole\n"
-        "  impactd tradeoff scene.json --solver exact --solver rk4\n"
-        "  impactd tradeoff - < scene.json                      from standard input\n"
-        "\n"
-        "Every solver is run at steps or tolerances a decade or two apart, and the exact\n"
-        "one also with less: impulses for contacts, fewer modes or samples, shorter\n"
-        "segments. Errors are the same each time; CPU times are measured and differ a\n"
-        "little. Ctrl-C stops at once. Exit code 3 if the scene has faults, 1 if its\n"
-        "exact run failed.\n",
+    .summary = "compare solvers and step sizes: error against CPU time",
+    .help = "  impactd tradeoff scene.json\n"
+            "  impactd tradeoff scene.json --error 1e-6          # of the displacement\n"
+            "  impactd tradeoff scene.json --metric psd --error 0.5    # of spectra, in dB\n"
+            "  impactd tradeoff scene.json -o out.svg -o out.json\n"
+            "  impactd tradeoff scene.json --solver exact --solver rk4\n"
+            "  impactd tradeoff - < scene.json                   # from standard input\n"
+            "\n"
+            "Each solver runs at several step sizes or tolerances. The exact solver also runs\n"
+            "simplified scenes: impulses instead of contacts, fewer modes, fewer samples and\n"
+            "shorter segments. The cheapest settings within the error are recommended. The\n"
+            "errors are reproducible; the CPU times are measured and vary a little. Ctrl-C\n"
+            "stops the study. Exit code 3 if the scene has faults, 1 if its exact run failed.\n",
     .options = tradeoff_fields,
 };
 
@@ -689,21 +682,19 @@ static void ensemble_choose(void *asked, StudySettings *settings) {
 
 const Command command_ensemble = {
     STUDY_COMMAND("ensemble", &study_ensemble, ensemble_choose),
-    .summary = "many seeds or uncertain inputs: means with their confidence, and spread",
-    .help =
-        "  impactd ensemble scene.json                          64 seeds: statistics and spectra\n"
-        "  impactd ensemble scene.json --runs 1000 -o out.csv   each run's numbers, by its seed\n"
-        "  impactd ensemble scene.json -o out.svg -o out.json   the chart, and all of it\n"
-        "  impactd ensemble scene.json --runs 1000 --target 0.01\n"
-        "                        no more of the 1000 than give the mean rms displacement to 1 %\n"
-        "  impactd ensemble scene.json --runs 1000 --target 0.05 --metric psd\n"
-        "  impactd ensemble - < scene.json                      from standard input\n"
-        "\n"
-        "The scene's excitation must be random, or its study must have uncertain inputs.\n"
-        "A run is the scene with one seed, from --first-seed on, and one draw of the\n"
-        "inputs; any of them can be run again alone. One that fails is reported and left\n"
-        "out. The same study gives the same bytes. Ctrl-C stops at once. Exit code 3 if\n"
-        "the scene has faults.\n",
+    .summary = "statistics over random seeds or uncertain inputs",
+    .help = "  impactd ensemble scene.json                       # 64 seeds\n"
+            "  impactd ensemble scene.json --runs 1000 -o out.csv      # a row for each run\n"
+            "  impactd ensemble scene.json -o out.svg -o out.json\n"
+            "  impactd ensemble scene.json --runs 1000 --target 0.01\n"
+            "  impactd ensemble scene.json --runs 1000 --target 0.05 --metric psd\n"
+            "  impactd ensemble - < scene.json                   # from standard input\n"
+            "\n"
+            "The excitation must be random, or the study must have uncertain inputs. A run is\n"
+            "the scene with one seed and one sample of the inputs. --target stops when the\n"
+            "mean of the metric is known to this relative error. A run that fails is reported\n"
+            "and left out. The same study gives the same bytes. Ctrl-C stops the study. Exit\n"
+            "code 3 if the scene has faults.\n",
     .options = ensemble_fields,
 };
 
@@ -719,82 +710,101 @@ static const Field sweep_fields[] = {
 
 const Command command_sweep = {
     STUDY_COMMAND("sweep", &study_sweep, NULL),
-    .summary = "the scene at many points: a grid or a list of values of its members",
-    .help = "  impactd sweep scene.json                             smallest and largest of each "
-            "metric\n"
-            "  impactd sweep scene.json -o out.csv -o out.svg       every point, and the chart\n"
-            "  impactd sweep - < scene.json                         from standard input\n"
+    .summary = "run a scene at a grid or a list of parameter values",
+    .help = "  impactd sweep scene.json --vary dampers.0.clearance=5mm:30mm:26\n"
+            "  impactd sweep scene.json --vary dampers.0.buffer=sponge,aluminium\n"
+            "  impactd sweep scene.json -o out.csv -o out.svg    # every point, and the chart\n"
+            "  impactd sweep - < scene.json                      # from standard input\n"
             "\n"
-            "The scene says what varies, by JSON Pointers into itself:\n"
+            "FROM:TO:COUNT is a range, equally spaced; with :log at its end the ratios are\n"
+            "equal. Several --vary are a grid. Units are those of --set, see \"impactd help\n"
+            "run\". Without --vary the scene describes the sweep by JSON Pointers:\n"
             "\n"
             "  \"study\": {\"kind\": \"sweep\", \"axes\": [\n"
-            "    {\"pointer\": \"/dampers/0/clearance\", \"from\": 0.005, \"to\": 0.03, \"count\": "
-            "26},\n"
+            "    {\"pointer\": \"/dampers/0/clearance\",\n"
+            "     \"from\": 0.005, \"to\": 0.03, \"count\": 26},\n"
             "    {\"pointer\": \"/dampers/0/buffer\", \"values\": [\"sponge\", \"aluminium\"]}]}\n"
             "\n"
-            "Every point is validated before the first runs. The same sweep gives the same\n"
-            "bytes, here and by a server, which uses all its workers. Exit code 3 if the\n"
-            "scene has faults.\n",
+            "--vary replaces these axes, and a study of another kind. All points are\n"
+            "validated before the first run. The same sweep gives the same bytes, here and on\n"
+            "a server, which uses all its workers. Exit code 3 if the scene has faults.\n",
     .options = sweep_fields,
 };
 
-// Of the studies that design: what is printed, and the study in the scene.
-#define DESIGN_HELP(name, operands, prints, study)                                                 \
-    "  impactd " name " scene.json" operands "\n"                                                  \
-    "        " prints "\n"                                                                         \
-    "  impactd " name " scene.json" operands " -o out.svg -o out.csv\n"                            \
-    "        the chart, and the table as a file; --json prints the whole answer\n"                 \
-    "\n"                                                                                           \
-    "The scene says what is asked for, as in\n"                                                    \
-    "\n"                                                                                           \
-    "  \"study\": {\"kind\": \"" name "\", " study "}\n"                                           \
-    "\n"                                                                                           \
-    "Exit code 3 if the scene has faults.\n"
-
 const Command command_optimize = {
     STUDY_COMMAND("optimize", &study_optimize, NULL),
-    .summary = "values of members of a scene that make a metric best, under constraints",
-    .help =
-        DESIGN_HELP("optimize", "",
-                    "the best values, their gain and their rivals; of two objectives the best\n"
-                    "        compromise, the nearest to the best values of both, and the front",
-                    "\"objectives\": [{\"metric\": \"rms_displacement\"}],\n"
-                    "    \"variables\": [{\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, "
-                    "\"to\": 0.03}],\n"
-                    "    \"over\": {\"runs\": 64}"),
+    .summary = "find parameter values that minimize or maximize a metric",
+    .help = "  impactd optimize scene.json\n"
+            "  impactd optimize scene.json -o out.svg -o out.csv\n"
+            "  impactd optimize scene.json --json       # the complete result\n"
+            "\n"
+            "Prints the best values, the gain, and other values that are nearly as good. With\n"
+            "two objectives it prints the front and the best compromise: the point nearest to\n"
+            "the best values of both. The scene describes the study:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"optimize\",\n"
+            "    \"objectives\": [{\"metric\": \"rms_displacement\"}],\n"
+            "    \"variables\": [\n"
+            "      {\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, \"to\": 0.03}],\n"
+            "    \"over\": {\"runs\": 64}}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
     .options = study_fields,
 };
 
 const Command command_calibrate = {
     STUDY_COMMAND("calibrate", &study_calibrate, NULL),
     .summary = "fit parameters of a scene to measured motions",
-    .help = DESIGN_HELP("calibrate", "", "the parameters with their intervals, and the verdict",
-                        "\"parameters\":\n"
-                        "      [{\"pointer\": \"/dampers/0/buffer/restitution\", \"from\": 0.3, "
-                        "\"to\": 0.9}],\n"
-                        "    \"measured\": [{\"channel\": \"displacement\", \"interval\": 0.01, "
-                        "\"samples\": [...]}]"),
+    .help = "  impactd calibrate scene.json\n"
+            "  impactd calibrate scene.json -o out.svg -o out.csv\n"
+            "  impactd calibrate scene.json --json       # the complete result\n"
+            "\n"
+            "Prints the parameters with their intervals, and whether they explain the\n"
+            "measurement. The scene describes the study:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"calibrate\",\n"
+            "    \"parameters\": [\n"
+            "      {\"pointer\": \"/dampers/0/buffer/restitution\", \"from\": 0.3, \"to\": 0.9}],\n"
+            "    \"measured\": [\n"
+            "      {\"channel\": \"displacement\", \"interval\": 0.01, \"samples\": [...]}]}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
     .options = study_fields,
 };
 
 const Command command_response = {
     STUDY_COMMAND("response", &study_response, NULL),
-    .summary = "steady motion under a sine while a number varies: periodic orbits, stability",
-    .help = DESIGN_HELP("response", "", "the curve as a table; the scene's excitation is a sine",
-                        "\"direction\": \"both\", \"axis\":\n"
-                        "    {\"pointer\": \"/excitation/frequency\", \"from\": 3, \"to\": 5, "
-                        "\"count\": 81}"),
+    .summary = "steady motion under a sine over one parameter: response curve",
+    .help = "  impactd response scene.json\n"
+            "  impactd response scene.json -o out.svg -o out.csv\n"
+            "  impactd response scene.json --json       # the complete result\n"
+            "\n"
+            "Prints period, stability and peaks at each point. The excitation of the scene\n"
+            "must be a sine. The scene describes the study:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"response\", \"direction\": \"both\",\n"
+            "    \"axis\": {\"pointer\": \"/excitation/frequency\",\n"
+            "             \"from\": 3, \"to\": 5, \"count\": 81}}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
     .options = study_fields,
 };
 
 const Command command_fragility = {
     STUDY_COMMAND("fragility", &study_fragility, NULL),
-    .summary = "probability of exceeding limits under ground motions of rising intensity",
-    .help = DESIGN_HELP("fragility", " --record a.AT2 --record b.AT2",
-                        "the limits' medians and dispersions; the scene names the files without "
-                        ".AT2",
-                        "\"records\": [\"a\", \"b\"], \"intensity\": \"pga\",\n"
-                        "    \"levels\": {\"from\": 0.5, \"to\": 10, \"count\": 20},\n"
-                        "    \"limits\": [{\"metric\": \"peak_displacement\", \"value\": 0.02}]"),
+    .summary = "probability of exceeding limits under ground motions",
+    .help = "  impactd fragility scene.json --record a.AT2 --record b.AT2\n"
+            "  impactd fragility scene.json --record a.AT2 -o out.svg -o out.csv\n"
+            "  impactd fragility scene.json --record a.AT2 --json    # the complete result\n"
+            "\n"
+            "Prints median and dispersion of each limit. The scene names each record by its\n"
+            "file without the extension, and describes the study:\n"
+            "\n"
+            "  \"study\": {\"kind\": \"fragility\", \"records\": [\"a\", \"b\"], \"intensity\": "
+            "\"pga\",\n"
+            "    \"levels\": {\"from\": 0.5, \"to\": 10, \"count\": 20},\n"
+            "    \"limits\": [{\"metric\": \"peak_displacement\", \"value\": 0.02}]}\n"
+            "\n"
+            "Exit code 3 if the scene has faults.\n",
     .options = study_fields,
 };

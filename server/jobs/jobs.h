@@ -36,6 +36,10 @@ typedef struct JobManagerSettings {
 Status jobs_prepare(Db *db, const char *text, size_t size, const SimulationLimits *limits,
                     StudyRequest *request, Warnings *warnings, Problem *problem);
 
+// STATUS_INVALID if a completed study is predicted to take more than `max` seconds of CPU in all;
+// NAN or 0: no limit. `option` sets it.
+Status jobs_limit_study(const StudyRequest *request, const SimulationLimits *limits, double max,
+                        const char *option, Problem *problem);
 // The same for a client. Its study must be within study_seconds where there are limits, and only so
 // many requests may plan large structures at once: STATUS_BUSY beyond.
 Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,

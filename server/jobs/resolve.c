@@ -760,26 +760,27 @@ Status jobs_prepare(Db *db, const char *text, size_t size, const SimulationLimit
     return request_prepare(db, NULL, text, size, limits, request, warnings, problem);
 }
 
-static Status request_limit_study(const JobManager *manager, const StudyRequest *request,
-                                  Problem *problem) {
-    const double max = manager->settings.study_seconds;
+Status jobs_limit_study(const StudyRequest *request, const SimulationLimits *limits, double max,
+                        const char *option, Problem *problem) {
     Cost cost;
-    if (request->study == NULL || max == 0)
+    if (request->study == NULL || !(max > 0))
         return STATUS_OK;
-    TRY(study_request_cost(request, &manager->settings.limits, &cost, problem));
+    TRY(study_request_cost(request, limits, &cost, problem));
     if (cost.cpu_seconds <= max)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
-                       "would take about %.3g s of CPU, at most %g s are allowed: take fewer runs "
-                       "or a shorter duration, or raise --max-study-seconds of the daemon",
-                       cost.cpu_seconds, max);
+                       "would take about %.3g s of CPU in all, at most %g s are allowed by %s: %s",
+                       cost.cpu_seconds, max, option, study_kind(request->study)->shorten);
 }
 
 Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,
                             const SimulationLimits *limits, StudyRequest *request,
                             Warnings *warnings, Problem *problem) {
     TRY(request_prepare(manager->db, manager, text, size, limits, request, warnings, problem));
-    return limits != NULL ? request_limit_study(manager, request, problem) : STATUS_OK;
+    return limits == NULL ? STATUS_OK
+                          : jobs_limit_study(request, &manager->settings.limits,
+                                             manager->settings.study_seconds,
+                                             "--max-study-seconds of the server", problem);
 }
 
 void jobs_result_id(const StudyRequest *request, char target[72]) {
