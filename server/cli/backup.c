@@ -123,16 +123,14 @@ static int check_db(const Command *self, void *of, const Options *options, Probl
 const Command command_backup = {
     .name = "backup",
     .operands = "FILE",
-    .summary = "copy the database, while the server runs or without it",
-    .help = "  impactd backup lab.db                          everything that was answered before\n"
-            "  impactd backup lab.db --force                  in the place of the last one\n"
+    .summary = "copy the database of a server, also while it runs",
+    .help = "  impactd backup lab.db\n"
+            "  impactd backup lab.db --force               # replace the previous backup\n"
             "  impactd backup /backups/lab-$(date +%F).db --data /var/lib/impactd\n"
             "\n"
-            "The server answers meanwhile. The copy is of one moment, is checked, and appears\n"
-            "whole or not at all; it has the tokens' digests and is readable by you alone.\n"
-            "Ctrl-C leaves nothing.\n"
-            "\n"
-            "impactd restore FILE puts it back.\n",
+            "The server answers requests meanwhile. The copy has the state of one moment. It\n"
+            "is checked, and is written completely or not at all. It contains the digests of\n"
+            "the tokens and can be read only by its owner. \"impactd restore\" restores it.\n",
     .options = backup_fields,
     .size = sizeof(BackupSettings),
     .run = backup,
@@ -141,15 +139,13 @@ const Command command_backup = {
 const Command command_restore = {
     .name = "restore",
     .operands = "FILE",
-    .summary = "put a backup back as the server's database",
-    .help =
-        "  impactd restore lab.db --data DIR              into a folder without a database\n"
-        "  impactd restore lab.db --force                 in the place of the folder's database\n"
-        "\n"
-        "Stop the server first. FILE is copied and checked, and the folder has either the\n"
-        "database of before or the whole of FILE, also after a crash. FILE itself stays as\n"
-        "it is. Jobs that were unfinished in the backup are taken up again when the\n"
-        "server starts.\n",
+    .summary = "restore the database of a server from a backup",
+    .help = "  impactd restore lab.db --data DIR           # into a directory without one\n"
+            "  impactd restore lab.db --force              # replace the database\n"
+            "\n"
+            "Stop the server first. FILE is copied and checked. After a crash the directory\n"
+            "has either the previous database or the restored one. FILE is not changed. Jobs\n"
+            "that were unfinished in the backup continue when the server starts.\n",
     .options = restore_fields,
     .size = sizeof(BackupSettings),
     .run = restore,
@@ -157,13 +153,13 @@ const Command command_restore = {
 
 const Command command_check_db = {
     .name = "check-db",
-    .summary = "check the server's database, while it runs or without it",
+    .summary = "check the database of a server, also while it runs",
     .help = "  impactd check-db --data /var/lib/impactd\n"
             "\n"
-            "Checks the file as SQLite does, the references between tables and every row that has\n"
-            "checksums, and prints each damaged row. Exits with 1 if there is one. backup and\n"
-            "restore check what they copy in the same way. A daemon refuses to show a damaged\n"
-            "row; a damaged result or job can be deleted, else restore a backup.\n",
+            "Checks the file as SQLite does, the references between tables, and all rows that\n"
+            "have checksums. Prints each damaged row. Exit code 1 if there is one. backup and\n"
+            "restore make the same check. A server does not show a damaged row. Delete the\n"
+            "damaged job or result, or restore a backup.\n",
     .options = check_db_fields,
     .size = sizeof(BackupSettings),
     .run = check_db,

@@ -38,9 +38,9 @@ static const Command command_examples = {
     .name = "examples",
     .operands = "[NAME]",
     .summary = "list example scenes, or print one",
-    .help = "  impactd examples                                   all names and titles\n"
-            "  impactd examples paper_free_sponge                 print this scene\n"
-            "  impactd examples paper_free_sponge -o scene.json   write it to a file\n"
+    .help = "  impactd examples                                    # names and titles\n"
+            "  impactd examples paper_free_sponge                  # print this scene\n"
+            "  impactd examples paper_free_sponge -o scene.json    # write it to a file\n"
             "  impactd examples paper_free_sponge | impactd run -\n",
     .options = examples_fields,
     .size = sizeof(ExamplesSettings),
@@ -111,12 +111,13 @@ const OptionGroup command_groups[] = {
 static const char overview[] =
     "impactd simulates structures with impact dampers.\n"
     "\n"
-    "  impactd serve                        start a server on http://127.0.0.1:8080\n"
-    "  impactd run scene.json               run a scene without a server\n"
-    "  impactd submit scene.json --wait 60  run a scene on a server\n"
-    "  impactd get JOB series -o out.npy    download a part of its result\n"
+    "  impactd serve                        # start a server on 127.0.0.1:8080\n"
+    "  impactd run scene.json               # run a scene without a server\n"
+    "  impactd submit scene.json --wait 60  # run a scene on a server\n"
+    "  impactd get JOB series -o out.npy    # download a part of its result\n"
     "\n"
-    "A scene: a structure released from 15 mm, with a ball between two sponges in it.\n"
+    "A scene: a structure is released from 15 mm; in it a free mass moves between two\n"
+    "stops of sponge.\n"
     "\n"
     "  {\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092},\n"
     "   \"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}],\n"
@@ -125,9 +126,11 @@ static const char overview[] =
 
 static const char exits[] =
     "\n"
-    "\"impactd help COMMAND\" shows examples and options of a command. Exit codes: 0 ok,\n"
-    "1 failed, 2 usage, 3 faulty scene or file, 4 not found, 5 permission denied,\n"
-    "7 server unreachable, 8 job not finished after --wait, 130 interrupted.\n";
+    "\"impactd help COMMAND\" shows the examples and options of a command.\n"
+    "\n"
+    "Exit codes: 0 ok, 1 failed, 2 usage, 3 faulty scene or file, 4 not found,\n"
+    "5 permission denied, 7 server unreachable, 8 job not finished after --wait,\n"
+    "130 interrupted.\n";
 
 const Command *command_find(const char *name) {
     for (size_t i = 0; commands[i] != NULL; i++)
@@ -158,11 +161,12 @@ static void overview_print(FILE *file) {
 }
 
 static void command_print(const Command *command) {
-    printf("impactd %s%s%s: %s\n\n", command->name, command->operands != NULL ? " " : "",
-           command->operands != NULL ? command->operands : "", command->summary);
-    fputs(command->help, stdout);
+    printf("impactd %s: %s\n\nUsage: impactd %s%s%s%s\n\n%s", command->name, command->summary,
+           command->name, command->options != NULL ? " [OPTION]..." : "",
+           command->operands != NULL ? " " : "", command->operands != NULL ? command->operands : "",
+           command->help);
     if (command->options != NULL) {
-        putchar('\n');
+        fputs(command->groups == NULL ? "\nOptions:\n" : "\n", stdout);
         options_help(command->options, command->groups, stdout);
     }
 }

@@ -482,19 +482,20 @@ const Command command_submit = {
     .name = "submit",
     .operands = "SCENE.json",
     .summary = "send a scene to a server",
-    .help =
-        "  impactd submit scene.json                       print the id of the job\n"
-        "  impactd submit scene.json --wait 60             wait until it has finished\n"
-        "  impactd submit scene.json --wait 60 --json      print the finished job\n"
-        "  impactd submit scene.json --dry-run             plan and estimated cost; runs nothing\n"
-        "  impactd submit scene.json --title 'sponge, 15 mm' --label batch=7\n"
-        "  impactd submit - --server https://sim.example < scene.json\n"
-        "\n"
-        "If an answer was lost, send the scene again with the same --idempotency-key:\n"
-        "both are one job. A busy server is asked again, as its Retry-After says, while\n"
-        "--wait lasts. Ctrl-C ends the waiting only: the job continues, \"impactd cancel\"\n"
-        "stops it. Exit code 3 if the scene has faults, 1 if the job failed, 7 if the\n"
-        "server does not answer or is busy, 8 if the job has not finished after --wait.\n",
+    .help = "  impactd submit scene.json                   # print the id of the job\n"
+            "  impactd submit scene.json --wait 60         # wait until it has finished\n"
+            "  impactd submit scene.json --wait 60 --json  # print the finished job\n"
+            "  impactd submit scene.json --dry-run         # plan and cost; run nothing\n"
+            "  impactd submit scene.json --title 'sponge, 15 mm' --label batch=7\n"
+            "  impactd submit scene.json --vary dampers.0.clearance=5mm:30mm:26\n"
+            "  impactd submit - --server https://sim.example < scene.json\n"
+            "\n"
+            "\"impactd help run\" explains --set, \"impactd help sweep\" explains --vary. If an\n"
+            "answer was lost, send the scene again with the same --idempotency-key: both are\n"
+            "one job. While --wait lasts, a busy server is asked again. Ctrl-C stops the\n"
+            "waiting, not the job; \"impactd cancel\" stops the job. Exit code 3 if the scene\n"
+            "has faults, 1 if the job failed, 7 if the server does not answer or is busy, 8\n"
+            "if the job has not finished after --wait.\n",
     .options = submit_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
@@ -508,12 +509,12 @@ static const PrintTableView jobs_view = {
 const Command command_jobs = {
     .name = "jobs",
     .summary = "list the jobs of a server",
-    .help = "  impactd jobs                          the 20 newest jobs\n"
-            "  impactd jobs --status failed --all    all jobs that failed\n"
-            "  impactd jobs --q sponge --limit 100   jobs with this word\n"
-            "  impactd jobs --json                   as JSON, for programs\n"
+    .help = "  impactd jobs                                # the 20 newest jobs\n"
+            "  impactd jobs --status failed --all          # all jobs that failed\n"
+            "  impactd jobs --q sponge --limit 100         # jobs with this word\n"
+            "  impactd jobs --json\n"
             "\n"
-            "The column time has the duration of the run or, of a running job, its progress.\n",
+            "The column \"time\" has the duration of the run, or the progress of a running job.\n",
     .options = jobs_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
@@ -526,10 +527,10 @@ const Command command_jobs = {
 const Command command_open = {
     .name = "open",
     .operands = "[ID]",
-    .summary = "show the dashboard, a job or a result in the browser",
-    .help = "  impactd open           the dashboard of the server\n"
-            "  impactd open j-7f3a    a job\n"
-            "  impactd open r-91c0    a result\n"
+    .summary = "open the dashboard, a job or a result in the browser",
+    .help = "  impactd open                                # the dashboard\n"
+            "  impactd open j-7f3a                         # a job\n"
+            "  impactd open r-91c0                         # a result\n"
             "\n"
             "Prints the address. Without a graphical display nothing is opened.\n",
     .options = open_fields,
@@ -544,13 +545,13 @@ const Command command_watch = {
     .name = "watch",
     .operands = "JOB",
     .summary = "follow a job of a server until it has finished",
-    .help = "  impactd watch j-7f3a                            a bar on a terminal, else lines\n"
-            "  impactd watch j-7f3a --json > job.json          the finished job\n"
+    .help = "  impactd watch j-7f3a                        # shows the progress\n"
+            "  impactd watch j-7f3a --json > job.json      # the finished job\n"
             "  impactd watch $(impactd submit scene.json) && impactd get ...\n"
             "\n"
             "Exit code 0 if the job was successful, 1 if it failed or was dismissed, 4 if it\n"
-            "does not exist, 8 if it has not finished after --wait. Ctrl-C ends the watching\n"
-            "only (130). A restart of the server does not end it.\n",
+            "does not exist, 8 if it has not finished after --wait. Ctrl-C stops the\n"
+            "watching, not the job (130). A restart of the server does not end it.\n",
     .options = watch_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
@@ -562,22 +563,21 @@ const Command command_get = {
     .name = "get",
     .operands = "RESULT-or-JOB [WHAT]",
     .summary = "download a result, its series, spectra or impacts",
-    .help = "  impactd get r-91c0                              summary, plan and units\n"
-            "  impactd get r-91c0 series -o motion.npy         time series, for numpy.load\n"
-            "  impactd get r-91c0 psd -o psd.svg               spectra as a chart\n"
-            "  impactd get r-91c0 series -o motion.csv --channels displacement --from 1 --to 2\n"
-            "  impactd get r-91c0 series --points 500          minimum and maximum of 500 buckets\n"
-            "  impactd get r-91c0 psd -o psd.csv               spectra\n"
-            "  impactd get r-91c0 impacts.csv                  all impacts, on standard output\n"
-            "  impactd get r-91c0 impacts/3/force -o one.csv   contact force of one impact\n"
-            "  impactd get j-7f3a --wait 60 -o motion.mat      of a job, when it has finished\n"
-            "  impactd get r-91c0 bundle -o all.zip            everything in one archive\n"
+    .help = "  impactd get r-91c0                              # summary, plan and units\n"
+            "  impactd get r-91c0 series -o motion.npy         # time series\n"
+            "  impactd get r-91c0 series -o motion.csv --channels displacement --to 2\n"
+            "  impactd get r-91c0 series --points 500          # reduced to 500 points\n"
+            "  impactd get r-91c0 psd -o psd.svg               # spectra as a chart\n"
+            "  impactd get r-91c0 impacts.csv                  # on standard output\n"
+            "  impactd get r-91c0 impacts/3/force -o one.csv   # force of one impact\n"
+            "  impactd get r-91c0 bundle -o all.zip            # everything\n"
+            "  impactd get j-7f3a --wait 60 -o motion.mat      # when the job has finished\n"
             "\n"
             "WHAT: result (default), series, psd, impacts, energy, manifest, bundle, job; of\n"
             "studies tradeoff, ensemble, compare, sensitivity, table, calibration, response,\n"
-            "optimum, fragility. Formats: json, csv, npy, npz, mat, zip, svg, as far as the\n"
-            "server has them. A file is written completely or not at all. Exit code 4 if there\n"
-            "is no such part, 8 if the job has not finished after --wait.\n",
+            "optimum, fragility. Formats: json, csv, npy, npz, mat, zip, svg; not every part\n"
+            "has all of them. A file is written completely or not at all. Exit code 4 if\n"
+            "there is no such part, 8 if the job has not finished after --wait.\n",
     .options = get_fields,
     .size = sizeof(JobsSettings),
     .run = api_command,
@@ -608,8 +608,8 @@ const Command command_compare = {
     .name = "compare",
     .operands = "A B",
     .summary = "compare two results of a server",
-    .help = "  impactd compare r-91c0 r-02ab           metrics of both, and inputs that differ\n"
-            "  impactd compare j-7f3a j-81dd --json    results of two jobs; as JSON\n"
+    .help = "  impactd compare r-91c0 r-02ab               # metrics, and inputs that differ\n"
+            "  impactd compare j-7f3a j-81dd --json        # results of two jobs, as JSON\n"
             "\n"
             "Exit code 4 if one of them does not exist.\n",
     .options = compare_fields,

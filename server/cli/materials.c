@@ -315,38 +315,38 @@ static const ApiAction materials_actions[] = {
 
 const Command command_materials = {
     .name = "materials",
-    .operands =
-        "list|show|add|revise|revert|approve|deprecate|history|diff|used-by|measure|measurements|"
-        "propose|derived|export|import [...]",
-    .summary = "the materials database: measure, revise, review, export, import",
-    .help =
-        "  impactd materials list --kind rubber --e 0.4..0.7      all materials, or a search\n"
-        "  impactd materials show sponge                          the revision in use; sponge@1\n"
-        "  impactd materials add foam.json                        a new material, a draft\n"
-        "  impactd materials measure foam test.json --trace a.csv a drop test, and its evaluation\n"
-        "  impactd materials measurements foam                    all drop tests, by number\n"
-        "  impactd materials propose foam                         a revision from all drop tests\n"
-        "  impactd materials propose foam --confirm --comment 'six drops'   and write it\n"
-        "  impactd materials show foam --editable > foam.json     its contents, to edit\n"
-        "  impactd materials revise foam foam.json --from 2 --comment 'thickness was 12 mm'\n"
-        "  impactd materials diff foam 1 3                        differences of two revisions\n"
-        "  impactd materials revert foam 1 --comment 'wrong test' a new revision equal to the "
-        "first\n"
-        "  impactd materials approve foam@3 --reason 'checked'    scenes use it from now on\n"
-        "  impactd materials deprecate foam@2 --reason 'wet'      scenes that name it get a "
-        "warning\n"
-        "  impactd materials history foam                         who changed what, when and why\n"
-        "  impactd materials used-by foam@2                       results that used it\n"
-        "  impactd materials derived foam --damper-mass 0.11 --structure-mass 1.35   k_b and c_b\n"
-        "  impactd materials export lab.csv                       the whole database, also as "
-        ".json\n"
-        "  impactd materials import lab.csv --dry-run             validate a file; write nothing\n"
-        "\n"
-        "FILE.json of add: {\"slug\": \"foam\", \"name\": \"Foam, 12 mm\", \"restitution\": 0.55,\n"
-        "\"contact_time\": 0.02, \"source\": \"drop test of 12 May\"}; /schemas/material has\n"
-        "all members. A revision never changes; a correction is a new revision. Exit\n"
-        "codes: 3 faults in a file (all are reported), 4 no such material, 5 permission\n"
-        "denied, 1 conflict (another client has changed it first).\n",
+    .operands = "ACTION [OPERAND]...",
+    .summary = "the materials of a server: measure, revise, review, export",
+    .help = "  impactd materials list --kind rubber --e 0.4..0.7\n"
+            "  impactd materials show sponge                   # or a revision, sponge@1\n"
+            "  impactd materials add foam.json                 # a new material, a draft\n"
+            "  impactd materials measure foam test.json --trace a.csv   # a drop test\n"
+            "  impactd materials measurements foam             # all drop tests\n"
+            "  impactd materials propose foam                  # a revision from drop tests\n"
+            "  impactd materials propose foam --confirm --comment 'six drops'\n"
+            "  impactd materials show foam --editable > foam.json\n"
+            "  impactd materials revise foam foam.json --from 2 --comment '12 mm'\n"
+            "  impactd materials diff foam 1 3                 # between two revisions\n"
+            "  impactd materials revert foam 1 --comment 'wrong test'\n"
+            "  impactd materials approve foam@3 --reason 'checked'\n"
+            "  impactd materials deprecate foam@2 --reason 'wet'\n"
+            "  impactd materials history foam                  # all changes\n"
+            "  impactd materials used-by foam@2                # results that used it\n"
+            "  impactd materials derived foam --damper-mass 0.11 --structure-mass 1.35\n"
+            "  impactd materials export lab.csv                # all materials, or .json\n"
+            "  impactd materials import lab.csv --dry-run      # check a file; write nothing\n"
+            "\n"
+            "Actions: list, show, add, revise, revert, approve, deprecate, history, diff,\n"
+            "used-by, measure, measurements, propose, derived, export, import. A revision\n"
+            "never changes; a correction is a new revision. Scenes that name a material use\n"
+            "its newest approved revision. A file for add:\n"
+            "\n"
+            "  {\"slug\": \"foam\", \"name\": \"Foam, 12 mm\", \"restitution\": 0.55,\n"
+            "   \"contact_time\": 0.02, \"source\": \"drop test of 12 May\"}\n"
+            "\n"
+            "/schemas/material of a server describes all members. Exit code 3 if a file has\n"
+            "faults, 4 if there is no such material, 5 if it is not permitted, 1 if another\n"
+            "client has changed the material meanwhile.\n",
     .options = materials_fields,
     .groups = groups,
     .size = sizeof(MaterialsSettings),

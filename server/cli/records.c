@@ -263,14 +263,15 @@ const Command command_import = {
     .name = "import",
     .operands = "FILE",
     .summary = "convert a ground motion file to an excitation",
-    .help = "  impactd import motion.AT2                        print an excitation for a scene\n"
-            "  impactd import motion.AT2 -o motion.json         write it to a file\n"
-            "  impactd import column.txt --interval 0.02 --unit g   if the file states neither\n"
-            "  impactd import motion.AT2 --scale 2              double the acceleration\n"
-            "  impactd import - < motion.AT2                    from standard input\n"
+    .help = "  impactd import motion.AT2                   # print an excitation for a scene\n"
+            "  impactd import motion.AT2 -o motion.json\n"
+            "  impactd import column.txt --interval 0.02 --unit g\n"
+            "  impactd import motion.AT2 --scale 2         # double the acceleration\n"
+            "  impactd import - < motion.AT2               # from standard input\n"
             "\n"
             "Formats: PEER AT2, old and new; a count and an interval before one column; times\n"
-            "and accelerations in two columns; bare columns. A summary is printed on stderr.\n"
+            "and accelerations in two columns; accelerations alone. --interval and --unit are\n"
+            "needed if the file does not state them. A summary is printed on standard error.\n"
             "Exit code 3 if the file has faults.\n",
     .options = import_fields,
     .size = sizeof(ImportSettings),
@@ -280,18 +281,18 @@ const Command command_import = {
 const Command command_records = {
     .name = "records",
     .operands = "list|add|show|delete [FILE-or-NAME]",
-    .summary = "ground motions on a server, for scenes to name",
-    .help =
-        "  impactd records add I-ELC180.AT2 --source 'PEER, RSN6' --processing 'as published'\n"
-        "  impactd records add column.txt --name tabas --interval 0.02 --unit g\n"
-        "  impactd records list --q elcentro\n"
-        "  impactd records show I-ELC180                   all about it, as JSON\n"
-        "  impactd records delete I-ELC180                 if no result uses it\n"
-        "\n"
-        "In a scene: \"excitation\": {\"kind\": \"record\", \"name\": \"I-ELC180\"}. The formats\n"
-        "are those of \"impactd help import\". A record never changes: other processing\n"
-        "makes another record. Exit code 3 if the file has faults, 4 if there is no such\n"
-        "record, 1 if it is in use or its name is taken.\n",
+    .summary = "ground motions of a server, for scenes to name",
+    .help = "  impactd records add I-ELC180.AT2 --source 'PEER, RSN6'\n"
+            "  impactd records add column.txt --name tabas --interval 0.02 --unit g\n"
+            "  impactd records list --q elcentro\n"
+            "  impactd records show I-ELC180\n"
+            "  impactd records delete I-ELC180             # if no result uses it\n"
+            "\n"
+            "In a scene: \"excitation\": {\"kind\": \"record\", \"name\": \"I-ELC180\"}. \"impactd "
+            "help\n"
+            "import\" lists the formats. A record never changes; add a processed version under\n"
+            "another name. Exit code 3 if the file has faults, 4 if there is no such record,\n"
+            "1 if it is in use or its name is taken.\n",
     .options = records_fields,
     .size = sizeof(RecordsSettings),
     .run = api_command,

@@ -439,17 +439,18 @@ static int serve_run(const Command *self, void *of, const Options *options, Prob
 
 const Command command_serve = {
     .name = "serve",
-    .summary = "run the server: jobs and results over HTTP",
+    .summary = "start a server, with a dashboard and an HTTP interface",
     .help = "  impactd serve\n"
             "  impactd serve --listen 127.0.0.1:0 --data /tmp/trial\n"
             "  impactd serve --print-config\n"
-            "  impactd token create --name lab; impactd serve --listen 0.0.0.0:8443 --tls-cert "
-            "c.pem --tls-key k.pem\n"
+            "  impactd token create --name lab\n"
+            "  impactd serve --listen 0.0.0.0:8443 --tls-cert c.pem --tls-key k.pem\n"
             "\n"
-            "Prints its URL and a curl command. SIGTERM or Ctrl-C ends it within 5 seconds;\n"
-            "unfinished jobs continue at the next start. SIGHUP reloads the certificate and\n"
-            "its key; if they are faulty the present ones stay in use. GET / of the URL shows\n"
-            "the API.\n",
+            "Prints the URL and a curl command. SIGTERM or Ctrl-C stops the server within 5\n"
+            "seconds; unfinished jobs continue at the next start. SIGHUP reads the\n"
+            "certificate and its key again; if they have faults, the present ones stay in\n"
+            "use. Each setting is also a variable of the environment, IMPACTD_MAX_BODY for\n"
+            "--max-body, and a line of the file of --config.\n",
     .options = serve_fields,
     .groups = serve_groups,
     .size = sizeof(ServeSettings),

@@ -162,16 +162,16 @@ static int token(const Command *self, void *settings, const Options *options, Pr
 const Command command_token = {
     .name = "token",
     .operands = "create|list|revoke|forget [NAME]",
-    .summary = "access tokens: who may use the server, and for what",
+    .summary = "create, list and revoke access tokens of a server",
     .help = "  TOKEN=$(impactd token create --name lab --scopes read,submit --expires 90)\n"
             "  curl -H \"Authorization: Bearer $TOKEN\" http://127.0.0.1:8080/v1/jobs\n"
             "  impactd token list\n"
             "  impactd token revoke lab\n"
+            "  impactd token forget lab                    # remove a revoked token\n"
             "\n"
-            "Works with a running server, which follows within a second, and without one.\n"
-            "From the first token on, also if it is revoked, every request needs one; once\n"
-            "all are forgotten (forget strikes a revoked one from the list) loopback is open\n"
-            "again.\n",
+            "A running server applies a change within a second. While there is a token, also\n"
+            "a revoked one, every request needs a valid token. When all tokens are forgotten,\n"
+            "the server is open on loopback again.\n",
     .options = token_fields,
     .size = sizeof(TokenSettings),
     .run = token,

@@ -261,10 +261,12 @@ static void completion_operands(FILE *file, const Command *command) {
     const size_t length = strcspn(operands, " ");
     const ApiAction *action = command->actions;
     fputs("        [ -n \"$option\" ] || case $count.$action in\n", file);
-    if (memchr(operands, '|', length) != NULL) {
+    if (memchr(operands, '|', length) != NULL || (action != NULL && action->name != NULL)) {
         fputs("        0.*) words='", file);
-        for (size_t i = 0; i < length; i++)
+        for (size_t i = 0; i < length && action == NULL; i++)
             fputc(operands[i] == '|' ? ' ' : operands[i], file);
+        for (size_t i = 0; action != NULL && action[i].name != NULL; i++)
+            fprintf(file, "%s ", action[i].name);
         fputs("' ;;\n", file);
     } else if (action == NULL && length > 0) {
         fprintf(file, "        0.*) kind=%s ;;\n",

@@ -29,6 +29,7 @@ def test_help_leads_with_examples():
     assert code == 0 and errors == ""
     lines = [line.strip() for line in out.splitlines() if line.strip()]
     assert lines[1].startswith("impactd serve"), lines[:3]
+    assert all(len(line) <= 80 for line in out.splitlines()), out
     for group in ("Run here, without a server", "Run a server", "Jobs of a server", "Data of a server", "Help"):
         assert f"\n{group}\n" in out, group
     for command in ("serve", "run", "check", "tradeoff", "ensemble", "import", "help", "version"):
@@ -38,13 +39,15 @@ def test_help_leads_with_examples():
         assert pages[0][0] == 0 and "impactd " + command in pages[0][1], command
 
 
-def test_a_letter_has_one_meaning():
-    """A letter belongs to the same option in all commands."""
+def test_help_fits_a_terminal_and_a_letter_has_one_meaning():
+    """Every line of every help has at most 80 columns, and a letter belongs to the same option in all commands."""
     names = re.findall(r"^  ([\w-]+)  +\S", program.run("--help")[1].split("1000}")[1], re.M)
     assert len(names) > 20, names
     letters = {}
     for name in names:
         text = program.run("help", name)[1]
+        long = [line for line in text.splitlines() if len(line) > 80]
+        assert not long, (name, long)
         for letter, option in re.findall(r"^  -(\w), (--[\w-]+)", text, re.M):
             assert letters.setdefault(letter, option) == option, (name, letter, option, letters[letter])
     assert letters["o"] == "--output" and letters["w"] == "--wait" and "h" not in letters, letters

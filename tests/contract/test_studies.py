@@ -74,7 +74,7 @@ def test_faults_have_their_exit_codes():
         code, out, _ = program.run("check", "-", text=json.dumps(study(kind)))
         assert code == 0 and f"Study: {kind}" in out
     code, out, _ = program.run("tradeoff", "--help")
-    assert code == 0 and out.splitlines()[2].strip().startswith("impactd tradeoff scene.json"), out
+    assert code == 0 and out.splitlines()[4].strip().startswith("impactd tradeoff scene.json"), out
 
 
 def test_every_format_that_a_help_names_is_written():
