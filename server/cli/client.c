@@ -19,6 +19,7 @@
 #include "core/scene/material.h"
 #include "server/api/app.h"
 #include "server/cli/files.h"
+#include "server/cli/report.h"
 #include "server/util/clock.h"
 
 enum {
@@ -620,7 +621,8 @@ Status api_print_tables(ApiCall *call, Problem *problem) {
     if (view == NULL || ((const ClientSettings *)call->settings)->json)
         api_print(call);
     else
-        TRY(command_print_tables(&call->answer.body, view, &rows, problem));
+        TRY(print_table_print_json(&call->answer.body, view, terminal_table_form(), stdout, &rows,
+                                   problem));
     if (rows == 0)
         fprintf(stderr, "impactd %s: nothing fits\n", call->command->name);
     return STATUS_OK;

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "core/base/spelling.h"
-#include "server/cli/report.h"
 #include "server/json/table.h"
 
 void command_print_faults(const char *name, const char *separator, const char *quote,
@@ -63,15 +62,6 @@ int command_end(const Command *self, Status status, const Problem *problem) {
         fprintf(stderr, "impactd %s: %s\n", self->name,
                 problem->detail[0] != '\0' ? problem->detail : status_title(status));
     return command_exit(status);
-}
-
-Status command_print_tables(const Bytes *json, const PrintTableView *view, size_t *longest,
-                            Problem *problem) {
-    Terminal terminal;
-    PrintTableForm form = {.width = 0};
-    if (terminal_find(&terminal))
-        form = (PrintTableForm){.width = terminal.columns, .has_colour = terminal.has_colour};
-    return print_table_print_json(json, view, &form, stdout, longest, problem);
 }
 
 Status command_action(const Options *options, const char *const *names, size_t stride,

@@ -62,11 +62,6 @@ int command_error(const char *name, const Problem *problem);
 // The end of a command: prints the reason of a failure on stderr; returns the exit code.
 int command_end(const Command *self, Status status, const Problem *problem);
 
-// Prints a document as tables on standard output; on a terminal in its width and with colour.
-// *longest as in print_table_print_json.
-Status command_print_tables(const Bytes *json, const struct PrintTableView *view, size_t *longest,
-                            Problem *problem);
-
 // The index of the action that the first operand names. `names` points to the name of the first
 // action; those of the others follow at `stride` bytes, NULL after the last. STATUS_USAGE lists
 // them.
@@ -76,6 +71,18 @@ Status command_action(const Options *options, const char *const *names, size_t s
 // Sets *folder, where it is NULL, to $IMPACTD_DATA, else to impactd under $XDG_STATE_HOME, else
 // under ~/.local/state; the caller frees it. STATUS_USAGE if none of them is set.
 Status command_data_folder(char **folder, Problem *problem);
+
+// The rows of settings with Texts of these names, which scene_edit applies.
+#define SET_ROW(Type)                                                                              \
+    FIELD_TEXTS(Type, set, NULL, NULL, 1000, PRESENCE_OPTIONAL, 0,                                 \
+                "value for a member of the scene, as dampers.0.clearance=10mm; repeatable")
+#define VARY_ROW(Type)                                                                             \
+    FIELD_TEXTS(Type, vary, NULL, NULL, 64, PRESENCE_OPTIONAL, 0,                                  \
+                "sweep a member of the scene, as dampers.0.clearance=5mm:30mm:26 (a range of 26 "  \
+                "values; add :log for equal ratios) or dampers.0.buffer=sponge,aluminium; "        \
+                "repeatable: a grid")
+// Applies --set and --vary, if the command has them, to the scene's text. STATUS_USAGE.
+Status scene_edit(const Command *self, const void *settings, Bytes *text, Problem *problem);
 
 // The exit code of a Status.
 int command_exit(Status status);

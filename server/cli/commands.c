@@ -8,6 +8,7 @@
 #include "server/api/app.h"
 #include "server/cli/client.h"
 #include "server/cli/files.h"
+#include "server/cli/report.h"
 #include "server/json/parse.h"
 #include "server/json/table.h"
 #include "server/options.h"
@@ -24,13 +25,11 @@ static int complete_run(const Command *self, void *settings, const Options *opti
 
 typedef struct ExamplesSettings {
     char *output;
-    bool json;
 } ExamplesSettings;
 
 static const Field examples_fields[] = {
     FIELD_TEXT(ExamplesSettings, output, 4000, PRESENCE_OPTIONAL, 0,
                "write the example to this file (standard output)"),
-    FIELD_FLAG(ExamplesSettings, json, false, "print the list as JSON"),
     FIELD_END,
 };
 
@@ -203,60 +202,43 @@ static int version_run(const Command *self, void *settings, const Options *optio
     return COMMAND_OK;
 }
 
-// Prints the names and titles of all examples.
-static Status examples_print(bool is_json, Problem *problem) {
-    static const PrintTableView view = {NULL, NULL, NULL};
-    Bytes json = {0};
-    Status status = STATUS_OK;
-    bytes_text(&json, "{\"examples\": [");
-    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++) {
-        StudyRequest scene;
-        char name[EXAMPLE_NAME];
-        (void)json_parse(file->bytes, file->size, study_request_fields, &scene, NULL);
-        bytes_json(&json, "%p{\"name\": %s, \"title\": %s}", file != embedded_examples ? ", " : "",
-                   example_name(file, name), scene.simulation.title);
-        study_request_clear(&scene);
-    }
-    bytes_text(&json, "]}\n");
-    if (is_json && !json.is_failed)
-        fputs(json.at, stdout);
-    else
-        status = command_print_tables(&json, &view, NULL, problem);
-    bytes_clear(&json);
-    return status;
-}
-
 static int examples_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    const ExamplesSettings *settings = of;
     const char *wanted = options->operand_count > 0 ? options->operands[0] : NULL;
     const char *names[EXAMPLES_MAX + 1] = {NULL};
     char known[EXAMPLES_MAX][EXAMPLE_NAME];
-    if (wanted == NULL)
-        return command_end(self, examples_print(settings->json, problem), problem);
+    PrintTable table = {.columns = 2, .has_heads = true};
+    const PrintTableForm form = terminal_table_form();
+    print_table_add(&table, "name");
+    print_table_add(&table, "title");
     for (size_t i = 0; i < EXAMPLES_MAX && embedded_examples[i].path != NULL; i++) {
-        names[i] = example_name(&embedded_examples[i], known[i]);
-        if (strcmp(names[i], wanted) == 0)
-            return command_end(
-                self,
-                output_put(settings->output,
-                           &(Bytes){.at = (char *)(uintptr_t)embedded_examples[i].bytes,
-                                    .count = embedded_examples[i].size},
-                           problem),
-                problem);
+        const EmbeddedFile *file = &embedded_examples[i];
+        StudyRequest scene;
+        names[i] = example_name(file, known[i]);
+        if (wanted != NULL && strcmp(names[i], wanted) == 0) {
+            const Bytes text = {.at = (char *)(uintptr_t)file->bytes, .count = file->size};
+            print_table_clear(&table);
+            return command_end(self, output_put(*(char **)of, &text, problem), problem);
+        }
+        (void)json_parse(file->bytes, file->size, study_request_fields, &scene, NULL);
+        print_table_add(&table, "%s", names[i]);
+        print_table_add(&table, "%s", scene.simulation.title);
+        study_request_clear(&scene);
     }
-    const char *near = spelling_nearest(names, wanted);
-    return command_end(self,
-                       problem_set(problem, STATUS_NOT_FOUND, "there is no example \"%.60s\"%s%s%s",
-                                   wanted, near != NULL ? " (did you mean " : "",
-                                   near != NULL ? near : "", near != NULL ? "?)" : ""),
-                       problem);
+    if (wanted == NULL)
+        print_table_print(&table, &form, stdout);
+    print_table_clear(&table);
+    const char *near = wanted != NULL ? spelling_nearest(names, wanted) : NULL;
+    if (wanted != NULL)
+        (void)problem_set(problem, STATUS_NOT_FOUND, "there is no example \"%.60s\"%s%s%s", wanted,
+                          near != NULL ? " (did you mean " : "", near != NULL ? near : "",
+                          near != NULL ? "?)" : "");
+    return command_end(self, problem->status, problem);
 }
 
 static int cite_run(const Command *self, void *settings, const Options *options, Problem *problem) {
     (void)self, (void)options, (void)problem;
     if (!*(const bool *)settings)
-        printf("The program: impactd %s (engine %s), simulation of structures with impact\n"
-               "dampers.\n"
+        printf("impactd %s (engine %s), simulation of structures with impact dampers.\n"
                "\n"
                "Its model: K. Li and A. P. Darby, Modelling a buffered impact damper system\n"
                "using a spring-damper model of impact, Structural Control and Health\n"

@@ -37,18 +37,6 @@ typedef struct RecordFiles {
                 "again"),                                                                          \
         FIELD_CHOICE(Type, unit, acceleration_unit_names, OPTIONAL,                                \
                      "of these files: g, m/s^2 or cm/s^2; overrides the files")
-// The rows of settings with Texts of these names, which scene_edit applies.
-#define SET_ROW(Type)                                                                              \
-    FIELD_TEXTS(Type, set, NULL, NULL, 1000, PRESENCE_OPTIONAL, 0,                                 \
-                "value for a member of the scene, as dampers.0.clearance=10mm; repeatable")
-#define VARY_ROW(Type)                                                                             \
-    FIELD_TEXTS(Type, vary, NULL, NULL, 64, PRESENCE_OPTIONAL, 0,                                  \
-                "sweep a member of the scene, as dampers.0.clearance=5mm:30mm:26 (a range of 26 "  \
-                "values; add :log for equal ratios) or dampers.0.buffer=sponge,aluminium; "        \
-                "repeatable: a grid")
-// Applies --set and --vary, if the command has them, to the scene's text. STATUS_USAGE.
-Status scene_edit(const Command *self, const void *settings, Bytes *text, Problem *problem);
-
 Status record_files_add(struct Db *db, const RecordFiles *files, Problem *problem);
 // "csv" of "/data/out.csv"; NULL if there is none.
 const char *path_extension(const char *path);

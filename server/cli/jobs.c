@@ -11,6 +11,7 @@
 #include "core/base/rfc3339.h"
 #include "server/cli/client.h"
 #include "server/cli/files.h"
+#include "server/cli/report.h"
 #include "server/jobs/job.h"
 #include "server/json/document.h"
 #include "server/util/clock.h"
@@ -233,8 +234,8 @@ static Status cancel_act(ApiCall *call, Problem *problem) {
 
 enum { PAGE_JOBS = 100 }; // of one answer, at most
 
-// A time in words: "5 s", "3 min", "2 h", "4 d".
-static void age_put(Bytes *json, double seconds) {
+// Adds a time in words: "5 s", "3 min", "2 h", "4 d".
+static void age_add(PrintTable *table, double seconds) {
     static const struct {
         double size;
         const char *name;
@@ -242,33 +243,36 @@ static void age_put(Bytes *json, double seconds) {
     size_t i = 0;
     while (i + 1 < COUNT(units) && seconds < units[i].size)
         i++;
-    bytes_format(json, "\"%.0f %s\"", floor(fmax(seconds, 0) / units[i].size), units[i].name);
+    print_table_add(table, "%.0f %s", floor(fmax(seconds, 0) / units[i].size), units[i].name);
 }
 
-// One row of the table. The time is that of the run, or how much of it is done.
-static void jobs_put(const JsonDocument *job, Bytes *json) {
+// Adds a row. The time is that of the run or, of a running job, how much of it is done.
+static void jobs_add(PrintTable *table, const JsonDocument *job) {
+    const char *id = json_get_text(job, "id"), *title = json_get_text(job, "title");
     const char *status = json_get_text(job, "status"), *created = json_get_text(job, "created");
     const double run = json_get_number(json_get_object(job, "timing"), "run");
-    int64_t created_ms = 0;
-    bytes_json(json, "{\"id\": %s, \"status\": %s, \"age\": ", json_get_text(job, "id"), status);
-    if (created != NULL && rfc3339_read(created, &created_ms))
-        age_put(json, 1e-3 * (double)(clock_unix_ms() - created_ms));
-    else
-        bytes_text(json, "null");
+    int64_t created_ms = clock_unix_ms();
+    (void)(created != NULL && rfc3339_read(created, &created_ms));
+    print_table_add(table, "%s", id != NULL ? id : "");
+    print_table_add(table, "%s", status != NULL ? status : "");
+    age_add(table, 1e-3 * (double)(clock_unix_ms() - created_ms));
     if (status != NULL && strcmp(status, "running") == 0)
-        bytes_format(json, ", \"time\": \"%.0f %%\"", json_get_number(job, "progress"));
-    else if (!isnan(run))
-        bytes_format(json, ", \"time\": \"%.3g %s\"", run < 1 ? 1e3 * run : run,
-                     run < 1 ? "ms" : "s");
-    bytes_json(json, ", \"title\": %s}", json_get_text(job, "title"));
+        print_table_add(table, "%.0f %%", json_get_number(job, "progress"));
+    else if (isnan(run))
+        print_table_add(table, "%s", "");
+    else
+        print_table_add(table, "%.3g %s", run < 1 ? 1e3 * run : run, run < 1 ? "ms" : "s");
+    print_table_add(table, "%s", title != NULL ? title : "");
 }
 
 static Status jobs_act(ApiCall *call, Problem *problem) {
+    static const char *const heads[] = {"id", "status", "age", "time", "title"};
     const JobsSettings *settings = call->settings;
     const size_t limit = settings->all ? SIZE_MAX : settings->limit;
     char path[40];
     ApiAction action = *call->action;
-    Bytes json = {0};
+    PrintTable table = {.columns = COUNT(heads), .has_heads = true};
+    const PrintTableForm form = terminal_table_form();
     const JsonDocument *job;
     size_t count = 0;
     snprintf(path, sizeof path, "/v1/jobs?limit=%zu", limit < PAGE_JOBS ? limit : PAGE_JOBS);
@@ -280,17 +284,16 @@ static Status jobs_act(ApiCall *call, Problem *problem) {
         return STATUS_OK;
     }
     (void)api_reply(call);
-    bytes_text(&json, "{\"jobs\": [");
-    for (; count < limit && (job = json_get_item(call->reply, "jobs", count)) != NULL; count++) {
-        bytes_text(&json, count > 0 ? ", " : "");
-        jobs_put(job, &json);
-    }
-    bytes_text(&json, "]}");
-    const bool is_more = call->answer.next[0] != '\0' || json_get_item(call->reply, "jobs", count);
-    bytes_clear(&call->answer.body);
-    call->answer.body = json;
-    TRY(api_print_tables(call, problem));
-    if (is_more)
+    for (size_t i = 0; i < COUNT(heads); i++)
+        print_table_add(&table, "%s", heads[i]);
+    for (; count < limit && (job = json_get_item(call->reply, "jobs", count)) != NULL; count++)
+        jobs_add(&table, job);
+    if (count > 0)
+        print_table_print(&table, &form, stdout);
+    print_table_clear(&table);
+    if (count == 0)
+        fputs("impactd jobs: there are none\n", stderr);
+    else if (call->answer.next[0] != '\0' || json_get_item(call->reply, "jobs", count) != NULL)
         fprintf(stderr, "impactd jobs: these are the newest %zu; --limit N or --all shows more\n",
                 count);
     return STATUS_OK;
@@ -502,10 +505,6 @@ const Command command_submit = {
     .actions = &(const ApiAction){.takes = "one scene", .operands = "f", .act = submit_act},
 };
 
-static const PrintTableView jobs_view = {
-    .lists = (const PrintTableColumns[]){{"jobs", {"id", "status", "age", "time", "title"}},
-                                         {NULL, {NULL}}}};
-
 const Command command_jobs = {
     .name = "jobs",
     .summary = "list the jobs of a server",
@@ -521,7 +520,6 @@ const Command command_jobs = {
     .actions =
         &(const ApiAction){
             .takes = "no operands", .operands = "", .act = jobs_act, .query = "status q"},
-    .view = &jobs_view,
 };
 
 const Command command_open = {

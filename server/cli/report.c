@@ -155,6 +155,13 @@ bool terminal_find(Terminal *terminal) {
     return true;
 }
 
+PrintTableForm terminal_table_form(void) {
+    Terminal terminal;
+    const bool is_terminal = terminal_find(&terminal);
+    return (PrintTableForm){.width = is_terminal ? terminal.columns : 0,
+                            .has_colour = is_terminal && terminal.has_colour};
+}
+
 // --- text ---
 
 typedef struct ReportText {

@@ -58,6 +58,8 @@ typedef struct Terminal {
     bool is_utf8, has_colour;
 } Terminal;
 bool terminal_find(Terminal *terminal);
+// Of tables on standard output: on a terminal its width, and colour.
+PrintTableForm terminal_table_form(void);
 
 void report_print(Report *report, const Terminal *terminal, const Texts *files);
 

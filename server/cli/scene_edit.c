@@ -5,7 +5,7 @@
 
 #include "core/base/json_pointer.h"
 #include "core/study/study.h"
-#include "server/cli/files.h"
+#include "server/cli/command.h"
 #include "server/json/document.h"
 #include "server/json/parse.h"
 #include "server/util/units.h"
@@ -17,7 +17,6 @@ typedef struct SceneEdit {
     char place[PLACE_SIZE]; // "--set PATH", for faults
     char pointer[PLACE_SIZE];
     const char *value;
-    bool takes_null; // of the row
 } SceneEdit;
 
 // "dampers.0.clearance=10mm", or with a JSON Pointer.
@@ -108,96 +107,67 @@ static Status scene_edit_axis(const SceneEdit *edit, const Field *row, bool is_t
     return STATUS_OK;
 }
 
-// Appends the JSON that the option asks for: a value, or an axis of a sweep. A text that cannot be
-// read as a scene at all is left to its reader; then nothing is appended.
-static Status scene_edit_read(SceneEdit *edit, bool is_axis, const Bytes *text, Bytes *json,
-                              Problem *problem) {
+// Sets the member of one --set or, with `axes`, appends an axis for one --vary. A text that cannot
+// be read as a scene at all is left to its reader.
+static Status scene_edit_one(const char *option, const char *given, Bytes *text, Bytes *axes,
+                             Problem *problem) {
+    SceneEdit edit;
     StudyRequest request;
+    Bytes json = {0};
     char message[JSON_POINTER_MESSAGE_MAX];
     bool is_tag;
+    TRY(scene_edit_split(option, given, &edit, problem));
+    const bool is_read = json_parse(text->at, text->count, study_request_fields, &request, NULL) !=
+                         STATUS_UNREADABLE;
+    const Field *row =
+        json_pointer_row(study_request_fields, &request, edit.pointer, &is_tag, message);
+    const char *unit = row != NULL ? scene_edit_unit(row, text) : NULL;
     Status status = STATUS_OK;
-    if (json_parse(text->at, text->count, study_request_fields, &request, NULL) !=
-        STATUS_UNREADABLE) {
-        const Field *row =
-            json_pointer_row(study_request_fields, &request, edit->pointer, &is_tag, message);
-        const char *unit = row != NULL ? scene_edit_unit(row, text) : NULL;
-        edit->takes_null = row != NULL && (row->flags & FIELD_NULL_IS_EMPTY) != 0;
-        if (row == NULL)
-            status =
-                problem_add(problem, STATUS_USAGE, edit->place, "names no member: %s", message);
-        else if (is_axis)
-            status = scene_edit_axis(edit, row, is_tag, unit, json, problem);
-        else
-            status = scene_edit_value(edit, row, is_tag, unit, edit->value, json, problem);
-    }
+    if (is_read && row == NULL)
+        status = problem_add(problem, STATUS_USAGE, edit.place, "names no member: %s", message);
+    else if (is_read && axes != NULL)
+        status = scene_edit_axis(&edit, row, is_tag, unit, axes, problem);
+    else if (is_read)
+        status = scene_edit_value(&edit, row, is_tag, unit, edit.value, &json, problem);
+    // Where null is no value of the member, it removes the member.
+    const bool is_null =
+        strcmp(edit.value, "null") == 0 && row != NULL && (row->flags & FIELD_NULL_IS_EMPTY) == 0;
+    if (status == STATUS_OK && json.count > 0)
+        status = json_edit_put(text, edit.pointer, is_null ? NULL : &json, edit.place, problem);
+    bytes_clear(&json);
     study_request_clear(&request);
     return status;
 }
 
-static Status scene_edit_set(const Texts *sets, Bytes *text, Problem *problem) {
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < sets->count; i++) {
-        SceneEdit edit;
-        Bytes json = {0};
-        Status one = scene_edit_split("--set", sets->at[i], &edit, problem);
-        if (one == STATUS_OK)
-            one = scene_edit_read(&edit, false, text, &json, problem);
-        // Where null is no value of the member, it removes the member.
-        const bool is_null = json.count == 4 && strcmp(json.at, "null") == 0 && !edit.takes_null;
-        if (one == STATUS_OK && json.count > 0)
-            one = json_edit_put(text, edit.pointer, is_null ? NULL : &json, edit.place, problem);
-        bytes_clear(&json);
-        status = status == STATUS_OK ? one : status;
-    }
-    return status;
-}
-
-// The sweep of the scene keeps its other members; any other study is replaced.
-static Status scene_edit_vary(const Texts *varies, Bytes *text, Problem *problem) {
-    Bytes json = {0};
-    Status status = STATUS_OK;
-    for (size_t i = 0; i < varies->count; i++) {
-        SceneEdit edit;
-        bytes_text(&json, i == 0 ? "[" : ", ");
-        Status one = scene_edit_split("--vary", varies->at[i], &edit, problem);
-        if (one == STATUS_OK)
-            one = scene_edit_read(&edit, true, text, &json, problem);
-        status = status == STATUS_OK ? one : status;
-    }
-    bytes_text(&json, "]");
+// Makes the axes those of the scene's sweep, or of a new one in the place of any other study.
+static Status scene_edit_sweep(const Bytes *axes, Bytes *text, Problem *problem) {
     JsonDocument *scene = json_open(text);
     const char *kind = json_get_text(json_get_object(scene, "study"), "kind");
     const bool is_sweep = kind != NULL && strcmp(kind, "sweep") == 0;
     json_close(scene);
-    static const struct {
-        const char *pointer, *value;
-    } members[] = {{"/study", "{\"kind\": \"sweep\"}"}, {"/study/mode", "\"grid\""}};
-    for (size_t i = is_sweep ? 1 : 0; i < COUNT(members) && status == STATUS_OK; i++) {
-        Bytes value = {0};
-        bytes_text(&value, members[i].value);
-        status = json_edit_put(text, members[i].pointer, &value, "--vary", problem);
-        bytes_clear(&value);
-    }
-    if (status == STATUS_OK)
-        status = json_edit_put(text, "/study/axes", &json, "--vary", problem);
-    bytes_clear(&json);
+    Bytes study = {0};
+    bytes_format(&study, is_sweep ? "[%s]" : "{\"kind\": \"sweep\", \"axes\": [%s]}", axes->at);
+    const Status status =
+        json_edit_put(text, is_sweep ? "/study/axes" : "/study", &study, "--vary", problem);
+    bytes_clear(&study);
     return status;
 }
 
-// The texts of an option of the command; NULL if it has none.
-static const Texts *scene_edit_texts(const Command *self, const void *settings, const char *name) {
-    size_t offset = 0;
-    const Field *row = fields_find(self->options, name, &offset);
-    const void *texts = row != NULL ? (const char *)settings + offset + row->offset : NULL;
-    return texts != NULL && ((const Texts *)texts)->count > 0 ? texts : NULL;
-}
-
 Status scene_edit(const Command *self, const void *settings, Bytes *text, Problem *problem) {
-    if (self->options == NULL)
-        return STATUS_OK;
-    const Texts *set = scene_edit_texts(self, settings, "set");
-    const Texts *vary = scene_edit_texts(self, settings, "vary");
-    if (set != NULL)
-        TRY(scene_edit_set(set, text, problem));
-    return vary != NULL ? scene_edit_vary(vary, text, problem) : STATUS_OK;
+    Bytes axes = {0};
+    Status status = STATUS_OK;
+    for (const Field *row = self->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
+        const bool is_vary = strcmp(row->name, "vary") == 0;
+        const Texts *given = (const void *)((const char *)settings + row->offset);
+        for (size_t i = 0; (is_vary || strcmp(row->name, "set") == 0) && i < given->count; i++) {
+            bytes_text(&axes, axes.count > 0 ? ", " : "");
+            const Status one = scene_edit_one(is_vary ? "--vary" : "--set", given->at[i], text,
+                                              is_vary ? &axes : NULL, problem);
+            status = status == STATUS_OK ? one : status;
+        }
+    }
+    if (status == STATUS_OK && axes.count > 0)
+        status = scene_edit_sweep(&axes, text, problem);
+    bytes_clear(&axes);
+    return status;
 }

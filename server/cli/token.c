@@ -1,5 +1,6 @@
 // The token itself goes to standard output and nothing else does, so that a script can take it.
 #include "server/cli/files.h"
+#include "server/cli/report.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -93,7 +94,8 @@ static Status token_list(Db *db, const TokenSettings *settings, TokenRow *row, P
     if (is_json && json.is_failed)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the list");
     const Status status = is_json ? output_put(NULL, &json, problem)
-                                  : command_print_tables(&json, &view, NULL, problem);
+                                  : print_table_print_json(&json, &view, terminal_table_form(),
+                                                           stdout, NULL, problem);
     bytes_clear(&json);
     return status;
 }

@@ -397,11 +397,9 @@ static void object_print(Printer *printer, json_t *object, const char *heading, 
     }
 }
 
-Status print_table_print_json(const Bytes *json, const PrintTableView *view,
-                              const PrintTableForm *form, FILE *file, size_t *longest,
-                              Problem *problem) {
-    static const PrintTableForm plain = {.width = 0};
-    Printer printer = {.view = view, .form = form != NULL ? form : &plain, .file = file};
+Status print_table_print_json(const Bytes *json, const PrintTableView *view, PrintTableForm form,
+                              FILE *file, size_t *longest, Problem *problem) {
+    Printer printer = {.view = view, .form = &form, .file = file};
     if (json->is_failed)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the tables");
     json_t *root = json_parse_tree(json->at, json->count);

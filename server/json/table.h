@@ -50,12 +50,10 @@ typedef struct PrintTableView {
 } PrintTableView;
 
 // Prints the members of a document that are not empty: plain values as name and value, a list of
-// objects as a table, neighbouring objects with the same members as rows of one table. `form` NULL:
-// without limit and colour. *longest is
+// objects as a table, neighbouring objects with the same members as rows of one table. *longest is
 // the number of rows of the longest table; NULL is allowed. STATUS_NO_MEMORY if the document has
 // failed, STATUS_UNREACHABLE if it is not a JSON object.
-Status print_table_print_json(const Bytes *json, const PrintTableView *view,
-                              const PrintTableForm *form, FILE *file, size_t *longest,
-                              Problem *problem);
+Status print_table_print_json(const Bytes *json, const PrintTableView *view, PrintTableForm form,
+                              FILE *file, size_t *longest, Problem *problem);
 
 #endif

@@ -32,7 +32,8 @@ static Status printed(const char *json, char **text, size_t *longest) {
     Bytes bytes = {0};
     *longest = 0;
     bytes_text(&bytes, json);
-    const Status status = print_table_print_json(&bytes, &view, NULL, file, longest, NULL);
+    const Status status =
+        print_table_print_json(&bytes, &view, (PrintTableForm){.width = 0}, file, longest, NULL);
     fclose(file);
     bytes_clear(&bytes);
     return status;
