@@ -3,14 +3,10 @@
 #include <ctype.h>
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
 #include "core/study/study.h"
-#include "server/api/app.h"
 #include "server/cli/command.h"
 #include "server/http/router.h"
-#include "server/json/document.h"
-#include "server/util/embedded.h"
 
 static const char *kind_name(const Field *row) {
     static const char *const names[] = {
@@ -273,254 +269,18 @@ void part_scene(FILE *file) {
     part_members(file, study_request_fields, "", 2);
 }
 
-// --- the API ---
-
-// A member's JSON text without its quotes and brackets, with `separator` for its commas.
-static void json_words(FILE *file, const JsonDocument *of, const char *name,
-                       const char *separator) {
-    Bytes text = {.most = 0};
-    json_get_value(of, name, &text);
-    for (const char *c = text.at; c != NULL && *c != '\0'; c++) {
-        if (*c == ',')
-            fputs(separator, file);
-        else if (strchr("[]\" ", *c) == NULL)
-            markdown_text(file, (const char[]){*c, '\0'});
-    }
-    bytes_clear(&text);
-}
-
-static void schema_bound(FILE *file, const JsonDocument *schema, const char *name,
-                         const char *words) {
-    const double bound = json_get_number(schema, name);
-    char text[32];
-    if (isfinite(bound))
-        fprintf(file, ", %s %s", words, text_real(text, bound));
-}
-
-static void schema_type(FILE *file, const JsonDocument *schema);
-
-static void schema_alternatives(FILE *file, const JsonDocument *schema, const char *name) {
-    const JsonDocument *one;
-    for (size_t i = 0; (one = json_get_item(schema, name, i)) != NULL; i++) {
-        fputs(i > 0 ? " or " : "", file);
-        schema_type(file, one);
-    }
-}
-
-// "list of [Job](#schema-job)"
-static void schema_type(FILE *file, const JsonDocument *schema) {
-    static const char own[] = "#/components/schemas/";
-    const char *reference = json_get_text(schema, "$ref"), *type = json_get_text(schema, "type");
-    const JsonDocument *properties = json_get_object(schema, "properties"), *values;
-    const char *name;
-    if (reference != NULL && strncmp(reference, own, sizeof own - 1) == 0) {
-        fprintf(file, "[%s](#schema-", reference + sizeof own - 1);
-        for (const char *c = reference + sizeof own - 1; *c != '\0'; c++)
+void part_paths(FILE *file) {
+    fputs("| call | scope | meaning |\n|---|---|---|\n", file);
+    for (const Route *route = routes; route->method != NULL; route++) {
+        fprintf(file, "| [%s %s](#", route->method, route->pattern);
+        for (const char *c = route->method; *c != '\0'; c++)
             fputc(tolower((unsigned char)*c), file);
-        fputs(")", file);
-    } else if (reference != NULL) {
-        fprintf(file, "[%s](..%s)", reference + sizeof "/schemas/" - 1, reference);
-    } else if (type != NULL && strcmp(type, "array") == 0) {
-        fputs("list of ", file);
-        schema_type(file, json_get_object(schema, "items"));
-    } else if (properties != NULL) {
-        fputs("object of ", file);
-        for (size_t i = 0; json_get_member(properties, i, &name) != NULL; i++)
-            fprintf(file, "%s`%s`", i > 0 ? ", " : "", name);
-    } else if ((values = json_get_object(schema, "additionalProperties")) != NULL &&
-               json_get_member(values, 0, &name) != NULL) {
-        fputs("by name: ", file);
-        schema_type(file, values);
-    } else {
-        json_words(file, schema, "type", " or ");
-    }
-    schema_alternatives(file, schema, "oneOf");
-    schema_alternatives(file, schema, "anyOf");
-    fputs(type != NULL && json_get_object(schema, "enum") != NULL ? ": " : "", file);
-    json_words(file, schema, "enum", ", ");
-    json_words(file, schema, "const", ", ");
-    const char *unit = json_get_text(schema, "x-unit");
-    if (unit != NULL) {
-        fputs(" \\[", file);
-        markdown_text(file, unit);
-        fputs("\\]", file);
-    }
-    schema_bound(file, schema, "minimum", "at least");
-    schema_bound(file, schema, "exclusiveMinimum", "above");
-    schema_bound(file, schema, "maximum", "at most");
-    schema_bound(file, schema, "default", "default");
-}
-
-static void json_description(FILE *file, const JsonDocument *of) {
-    const char *text = json_get_text(of, "description");
-    markdown_text(file, text != NULL ? text : "");
-}
-
-static void api_parameters(FILE *file, const JsonDocument *operation) {
-    const JsonDocument *one;
-    for (size_t i = 0; (one = json_get_item(operation, "parameters", i)) != NULL; i++) {
-        if (i == 0)
-            fputs("| parameter | in | type | meaning |\n|---|---|---|---|\n", file);
-        fprintf(file, "| `%s` | %s | ", json_get_text(one, "name"), json_get_text(one, "in"));
-        schema_type(file, json_get_object(one, "schema"));
-        fputs(" | ", file);
-        json_description(file, one);
+        fputc('-', file);
+        for (const char *c = route->pattern; *c != '\0'; c++)
+            if (strchr("/{}@.", *c) == NULL)
+                fputc(*c, file);
+        fprintf(file, ") | %s | ", route->scope);
+        markdown_text(file, route->doc);
         fputs(" |\n", file);
     }
-    fputc('\n', file);
-}
-
-static void api_content(FILE *file, const JsonDocument *of) {
-    const JsonDocument *content = json_get_object(of, "content"), *one;
-    const char *type;
-    for (size_t i = 0; (one = json_get_member(content, i, &type)) != NULL; i++) {
-        fprintf(file, "%s`%s`", i > 0 ? ", " : "", type);
-        if (strcmp(type, "application/json") == 0) {
-            fputs(": ", file);
-            schema_type(file, json_get_object(one, "schema"));
-        }
-    }
-}
-
-// The page says once what every path may answer: 401, 403 and 421.
-static void api_answers(FILE *file, const JsonDocument *root, const JsonDocument *operation) {
-    const JsonDocument *answers = json_get_object(operation, "responses");
-    const JsonDocument *shared = json_get_object(json_get_object(root, "components"), "responses");
-    fputs("| status | meaning | content |\n|---|---|---|\n", file);
-    for (int code = 200; code < 600; code++) {
-        char name[8];
-        snprintf(name, sizeof name, "%d", code);
-        const JsonDocument *one = json_get_object(answers, name);
-        if (one == NULL || code == 401 || code == 403 || code == 421)
-            continue;
-        const char *reference = json_get_text(one, "$ref"), *header;
-        if (reference != NULL)
-            one = json_get_object(shared, strrchr(reference, '/') + 1);
-        fprintf(file, "| %d | ", code);
-        json_description(file, one);
-        const JsonDocument *headers = json_get_object(one, "headers");
-        for (size_t i = 0; json_get_member(headers, i, &header) != NULL; i++)
-            fprintf(file, "%s`%s`", i > 0 ? ", " : "; headers: ", header);
-        fputs(" | ", file);
-        if (code < 400)
-            api_content(file, one);
-        else
-            fputs("[problem](problems.md)", file);
-        fputs(" |\n", file);
-    }
-    fputc('\n', file);
-}
-
-static const char *api_scope(const char *path, const char *method) {
-    const Route *route = routes;
-    while (strcmp(route->pattern, path) != 0 || strcasecmp(route->method, method) != 0)
-        route++;
-    return route->scope;
-}
-
-static void api_heading(FILE *file, const char *method, const char *path) {
-    for (const char *c = method; *c != '\0'; c++)
-        fputc(toupper((unsigned char)*c), file);
-    fprintf(file, " %s", path);
-}
-
-static void api_operation(FILE *file, const JsonDocument *root, const char *path,
-                          const char *method, const JsonDocument *operation) {
-    const char *description = json_get_text(operation, "description");
-    fputs("### ", file);
-    api_heading(file, method, path);
-    fputs("\n\n", file);
-    markdown_sentence(file, json_get_text(operation, "summary"));
-    if (description != NULL)
-        markdown_sentence(file, description);
-    const char *scope = api_scope(path, method);
-    if (strcmp(scope, "open") == 0)
-        fputs("Needs no token.\n\n", file);
-    else
-        fprintf(file, "Needs the scope `%s`.\n\n", scope);
-    api_parameters(file, operation);
-    const JsonDocument *body = json_get_object(operation, "requestBody");
-    if (body != NULL) {
-        fputs("Body: ", file);
-        api_content(file, body);
-        fputs(".\n\n", file);
-    }
-    api_answers(file, root, operation);
-}
-
-static void api_schemas(FILE *file, const JsonDocument *root) {
-    const JsonDocument *schemas = json_get_object(json_get_object(root, "components"), "schemas");
-    const JsonDocument *schema, *one;
-    const char *name;
-    fputs("## Schemas\n\nThe objects of the answers, by name.\n\n", file);
-    for (size_t i = 0; (schema = json_get_member(schemas, i, &name)) != NULL; i++) {
-        const JsonDocument *properties = json_get_object(schema, "properties");
-        fprintf(file, "### Schema %s\n\n", name);
-        const char *description = json_get_text(schema, "description");
-        if (description != NULL)
-            markdown_sentence(file, description);
-        if (properties == NULL) {
-            schema_type(file, schema);
-            fputs("\n\n", file);
-            continue;
-        }
-        fputs("| member | type | meaning |\n|---|---|---|\n", file);
-        for (size_t k = 0; (one = json_get_member(properties, k, &name)) != NULL; k++) {
-            fprintf(file, "| `%s` | ", name);
-            schema_type(file, one);
-            fputs(" | ", file);
-            json_description(file, one);
-            fputs(" |\n", file);
-        }
-        fputc('\n', file);
-    }
-}
-
-// All operations with links to their sections.
-static void api_overview(FILE *file, const JsonDocument *paths) {
-    const JsonDocument *path, *operation;
-    const char *target, *method;
-    fputs("## All paths\n\n| call | meaning |\n|---|---|\n", file);
-    for (size_t i = 0; (path = json_get_member(paths, i, &target)) != NULL; i++)
-        for (size_t k = 0; (operation = json_get_member(path, k, &method)) != NULL; k++) {
-            fputs("| [", file);
-            api_heading(file, method, target);
-            fprintf(file, "](#%s-", method);
-            for (const char *c = target; *c != '\0'; c++)
-                if (strchr("/{}@.", *c) == NULL)
-                    fputc(*c, file);
-            fputs(") | ", file);
-            markdown_text(file, json_get_text(operation, "summary"));
-            fputs(" |\n", file);
-        }
-    fputc('\n', file);
-}
-
-void part_api(FILE *file) {
-    const EmbeddedFile *source = embedded_find(embedded_schemas, "schema/openapi.json");
-    Bytes text = {.most = 0};
-    bytes_put(&text, source->bytes, source->size);
-    JsonDocument *root = json_open(&text);
-    bytes_clear(&text);
-    const JsonDocument *paths = json_get_object(root, "paths"), *tag, *path, *operation;
-    const char *target, *method;
-    api_overview(file, paths);
-    for (size_t i = 0; (tag = json_get_item(root, "tags", i)) != NULL; i++) {
-        Bytes tags = {.most = 0};
-        bytes_format(&tags, "[\"%s\"]", json_get_text(tag, "name"));
-        fprintf(file, "## %c%s\n\n", toupper((unsigned char)json_get_text(tag, "name")[0]),
-                json_get_text(tag, "name") + 1);
-        markdown_sentence(file, json_get_text(tag, "description"));
-        for (size_t k = 0; (path = json_get_member(paths, k, &target)) != NULL; k++)
-            for (size_t m = 0; (operation = json_get_member(path, m, &method)) != NULL; m++) {
-                Bytes own = {.most = 0};
-                json_get_value(operation, "tags", &own);
-                if (strcmp(own.at, tags.at) == 0)
-                    api_operation(file, root, target, method, operation);
-                bytes_clear(&own);
-            }
-        bytes_clear(&tags);
-    }
-    api_schemas(file, root);
-    json_close(root);
 }

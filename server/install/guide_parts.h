@@ -15,6 +15,6 @@ void default_write(const Field *row, Bytes *bytes);
 
 void part_commands(FILE *file); // each command with its options
 void part_scene(FILE *file);    // the members of a scene, place by place
-void part_api(FILE *file);      // the paths and schemas of openapi.json
+void part_paths(FILE *file);    // all calls of the API with their scopes
 
 #endif

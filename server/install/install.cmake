@@ -26,9 +26,11 @@ target_link_libraries(print_guide PRIVATE impactd_server PkgConfig::CMARK ${CMAR
 set_target_properties(print_guide PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/install)
 file(MAKE_DIRECTORY ${GUIDE})
 add_custom_command(OUTPUT ${GUIDE_PAGES} ${GUIDE_COPIES}
+    COMMAND sh -c "jq -r -f '${PROJECT_SOURCE_DIR}/web/guide/api.jq' '${PROJECT_SOURCE_DIR}/schema/openapi.json' > '${PAGES}/api.md'"
     COMMAND print_guide ${PROJECT_SOURCE_DIR}/web/guide ${PAGES} ${GUIDE}
     COMMAND ${CMAKE_COMMAND} -E copy ${GUIDE_FILES} ${GUIDE}
-    DEPENDS print_guide ${GUIDE_SOURCES} ${GUIDE_FILES} web/guide/guide.html web/guide/pages.txt ${PAGES}/impactd.1
+    DEPENDS print_guide ${GUIDE_SOURCES} ${GUIDE_FILES} web/guide/guide.html web/guide/pages.txt web/guide/api.jq
+        schema/openapi.json ${PAGES}/impactd.1
     COMMENT "Rendering the guide"
     VERBATIM)
 impactd_embed(impactd guide ${CMAKE_BINARY_DIR} ${GUIDE_PAGES} ${GUIDE_COPIES})

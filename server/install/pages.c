@@ -369,7 +369,7 @@ static const struct {
 } pages[] = {
     {"impactd.1", manual_program},     {"impactd-scene.5", manual_scene},
     {"impactd.bash", completion_bash}, {"commands.md", part_commands},
-    {"scene.md", part_scene},          {"api.md", part_api},
+    {"scene.md", part_scene},          {"paths.md", part_paths},
 };
 
 static FILE *page_open(const char *folder, const char *name) {

@@ -382,17 +382,3 @@ const JsonDocument *json_get_object(const JsonDocument *of, const char *name) {
 const JsonDocument *json_get_item(const JsonDocument *of, const char *name, size_t i) {
     return json_array_get(json_object_get(of, name), i);
 }
-
-const JsonDocument *json_get_member(const JsonDocument *of, size_t i, const char **name) {
-    void *at = json_object_iter((json_t *)of);
-    while (at != NULL && i-- > 0)
-        at = json_object_iter_next((json_t *)of, at);
-    *name = at != NULL ? json_object_iter_key(at) : NULL;
-    return at != NULL ? json_object_iter_value(at) : NULL;
-}
-
-void json_get_value(const JsonDocument *of, const char *name, Bytes *bytes) {
-    const json_t *value = json_object_get(of, name);
-    if (value != NULL)
-        value_put(bytes, value);
-}

@@ -60,9 +60,5 @@ bool json_get_flag(const JsonDocument *of, const char *name);
 const JsonDocument *json_get_object(const JsonDocument *of, const char *name);
 // Element i of a list of objects; NULL behind the last.
 const JsonDocument *json_get_item(const JsonDocument *of, const char *name, size_t i);
-// Member i of an object, in the order of the text, and its name; NULL behind the last.
-const JsonDocument *json_get_member(const JsonDocument *of, size_t i, const char **name);
-// Appends a member of any type as JSON text; nothing where it is absent.
-void json_get_value(const JsonDocument *of, const char *name, Bytes *bytes);
 
 #endif
