@@ -33,6 +33,10 @@ mark();
 for (const list of [at("guide-pages"), at("guide-contents")])
   list.addEventListener("click", (event) => event.target.closest("a") && list.matches(":popover-open") && list.hidePopover());
 
+// The page that is read is in sight in the list of pages, too.
+const list = at("guide-pages"), here = list.querySelector("[aria-current]");
+if (here && here.offsetTop > list.clientHeight - 60) list.scrollTop = here.offsetTop - list.clientHeight / 2;
+
 // The search. The index is read when the field gets the focus: [[page, title, [[anchor, heading, text] ...]] ...].
 const words = at("guide-words"), found = at("guide-found");
 let index = null, chosen = -1;
