@@ -153,7 +153,7 @@ def prose():
                             capture_output=True, text=True, check=True).stdout.split("\n")
     for path in filter(None, listed):
         name = os.path.join(program.SOURCE, path)
-        if "/vendor/" in path or path == "README.md" or not os.path.exists(name):
+        if "/vendor/" in path or not os.path.exists(name):
             continue
         readers = {".c": c_prose, ".h": c_prose, ".js": script_prose, ".html": html_prose, ".md": markdown_prose,
                    ".py": python_prose, ".txt": lines_prose}
