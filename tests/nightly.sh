@@ -186,6 +186,7 @@ part_bench() {
     sized '200 2 1' '' build/tests/bench_sweep
     sized '/tmp 0.2 jobs' /tmp build/tests/bench_intake
     sized '2 1000' '' build/tests/bench_optimize
+    sized '--scenes 10 --rounds 1' '' "$python" tests/bench/bench_client.py --build build
     # Its peers; nothing else needs them.
     check server/packages.sh <(printf '%s\n' nginx-light wrk)
     sized 'cached' '' "$python" tests/bench/service.py --build build
