@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """web/client/impactd.py as Python users meet it: installed by pip from a daemon, with and without NumPy, pandas and Matplotlib."""
 
+import ast
 import contextlib
 import io
 import json
@@ -97,6 +98,7 @@ def test_the_wheel_is_the_file_and_always_the_same():
         source = file.read()
     assert served.body == source and served.headers["content-type"] == "text/x-python; charset=utf-8", served
     assert f'href="/client/{WHEEL}"' in page and 'href="/client/impactd.py"' in page, page
+    ast.parse(source, feature_version=(3, 9))
     with tempfile.NamedTemporaryFile() as file:
         file.write(bodies[0])
         file.flush()

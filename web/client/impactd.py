@@ -40,6 +40,7 @@ __version__ = "0.1.0"
 __all__ = ["connect", "Lab", "Job", "Result", "Study", "Problem", "Fault", "Spectrum"]
 
 Scene = Union[Mapping[str, Any], str, "os.PathLike[str]", "Result"]
+Progress = Union[bool, Callable[[int, int], Any]]
 
 # Keywords with these names, and all with a dot or a slash, change the scene; others set a study.
 _SCENE_MEMBERS = ("structure", "dampers", "contact", "excitation", "duration", "sample_rate",
@@ -67,11 +68,11 @@ class Fault(NamedTuple):
 class Problem(Exception):
     """A request that the server refused, or a job that failed. `print(problem)` shows all faults.
 
-    status  HTTP status code; for a failed job that of its problem
-    type    what kind of problem, such as "/problems/invalid-scene"; the path leads to its documentation
-    title, detail   sentences
-    faults  all faults with their places, a list of Fault
-    job     the Job that failed or was refused, or None
+    status  HTTP status code; for a failed job that of its problem.
+    type    what kind of problem, such as "/problems/invalid-scene"; the path leads to its documentation.
+    title, detail   sentences.
+    faults  all faults with their places, a list of Fault.
+    job     the Job that failed or was refused, or None.
 
         try:
             lab.run({"structure": {"mass": -1}})
@@ -181,14 +182,11 @@ def _set(scene: Any, path: str, value: Any) -> None:
 
 
 def _cell(text: str) -> Any:
-    try:
+    if re.fullmatch(r"-?\d+", text):
         return int(text)
-    except ValueError:
-        pass
-    try:
+    if re.fullmatch(r"-?[\d.]+(e[-+]?\d+)?|nan|-?inf", text):
         return float(text)
-    except ValueError:
-        return {"true": True, "false": False}.get(text, text)
+    return {"true": True, "false": False}.get(text, text)
 
 
 def _read_csv(text: str) -> tuple[list[dict[str, Any]], dict[str, str]]:
@@ -230,7 +228,7 @@ def _read_npy(data: bytes) -> list[Any]:
     for c in range(int(found[2])):
         part = memoryview(data)[start + 8 * count * c:start + 8 * count * (c + 1)]
         if numpy:
-            columns.append(numpy.frombuffer(part, "<f8"))
+            columns.append(numpy.frombuffer(part, "<f8").astype(float))  # a copy, which may be changed
         else:
             numbers = array("d", bytes(part))
             if sys.byteorder == "big":
@@ -252,10 +250,10 @@ def _axis(path: Union[str, Sequence[str]], values: Any) -> dict[str, Any]:
     return axis
 
 
-def _axes(axes: Any) -> list[Any]:
+def _axes(axes: Any) -> Optional[list[Any]]:
     if isinstance(axes, collections.abc.Mapping):
         return [_axis(path, values) for path, values in axes.items()]
-    return list(axes)
+    return None if axes is None else list(axes)
 
 
 # --- the connection ---
@@ -270,7 +268,7 @@ class _Reply(NamedTuple):
 
 
 class _Http:
-    """Requests to one server: connections are reused, one thread has one at a time."""
+    """Requests to one server. Connections are reused; a thread has one of its own during a request."""
 
     def __init__(self, url: str, token: Optional[str], ca_file: Optional[str], timeout: float, patience: float):
         parts = urllib.parse.urlsplit(url if "//" in url else "http://" + url)
@@ -354,7 +352,7 @@ class _Http:
             delay = reply.headers.get("Retry-After")
             delay = float(delay) if delay and delay.isdigit() else None
             if reply.status in (429, 503) and delay is not None and time.monotonic() + delay < end:
-                time.sleep(delay * random.uniform(1, 1.2))
+                time.sleep(max(delay, 0.05) * random.uniform(1, 1.2))
                 continue
             raise Problem(*self.problem(reply))
 
@@ -400,7 +398,7 @@ def _name(text: str) -> str:
 class _Progress:
     """A line on standard error, or a call of the user's function with (done, total)."""
 
-    def __init__(self, wanted: Union[bool, Callable[[int, int], Any], None], total: int, what: str):
+    def __init__(self, wanted: Progress, total: int, what: str):
         self.call = wanted if callable(wanted) else None
         self.is_shown = wanted is True
         self.total, self.what, self.begin, self.shown = total, what, time.monotonic(), 0.0
@@ -478,12 +476,12 @@ class Job:
         return self
 
     def wait(self, timeout: Optional[float] = None) -> Job:
-        """Waits until the job is finished; TimeoutError after `timeout` seconds, while the job goes on."""
+        """Waits until the job is finished; TimeoutError after `timeout` seconds, while the job continues."""
         end = None if timeout is None else time.monotonic() + timeout
         while not self.is_finished:
             left = _WAIT if end is None else min(_WAIT, end - time.monotonic())
             if left <= 0:
-                raise TimeoutError(f"job {self.id} is {self.status} ({self.progress:g} %) after {timeout:g} s and goes on")
+                raise TimeoutError(f"job {self.id} is {self.status} ({self.progress:g} %) after {timeout:g} s and continues")
             self.refresh(min(left, max(self._lab._http.timeout / 2, 0.1)))
         return self
 
@@ -491,8 +489,8 @@ class Job:
         """Waits, and returns the Result, of a study the Study. Raises Problem where the job failed or was cancelled."""
         self.wait(timeout)
         if self.status != "successful":
-            raise Problem(self.document.get("problem") or {"title": f"Job {self.id} is {self.status}", "type": "/problems/" + self.status},
-                          job=self)
+            cancelled = {"title": f"Job {self.id} is {self.status}", "type": "/problems/" + self.status}
+            raise Problem(self.document.get("problem") or cancelled, job=self)
         return (Study if self.document.get("study") else Result)(self._lab, self.document["result"], self.document)
 
     def cancel(self) -> Job:
@@ -664,7 +662,7 @@ class Result:
         return self._get("energy", lambda: self._lab._http.json("GET", self._part("energy.json")))
 
     def compare(self, other: Union[Result, str]) -> dict[str, Any]:
-        """This result and another one side by side: metrics, inputs that differ, distance of spectra, time of divergence."""
+        """This result and another one with metrics, inputs that differ, distance of spectra, time of divergence."""
         return self._lab._http.json("GET", _query("/v1/compare", a=self.id, b=getattr(other, "id", other)))
 
     # What save writes, by extension, and the chart of plots in a notebook.
@@ -673,10 +671,10 @@ class Result:
     def save(self, path: Union[str, os.PathLike[str]], part: Optional[str] = None) -> None:
         """Writes a file, whole or not at all. The extension gives the format:
 
-        .csv .npy .npz .mat   the time series, of a study its table; part="psd", "impacts" or "energy" another part
-        .svg                  a chart of them
-        .json                 the job, the series, the impacts and the spectra in one document; of a study its answer
-        .zip                  everything, with a note on units and how to cite
+        .csv .npy .npz .mat   the time series, of a study its table; part="psd", "impacts" or "energy" another part.
+        .svg                  a chart of them.
+        .json                 the job, the series, the impacts and the spectra in one document; of a study its answer.
+        .zip                  everything, with a note on units and how to cite.
         """
         path = os.fspath(path)
         extension = os.path.splitext(path)[1][1:].lower()
@@ -707,7 +705,8 @@ class Result:
                 if problem.status != 404:
                     raise
                 return None
-        return {"job": self._job or self.document, **{name: optional(name + ".json") for name in ("series", "impacts", "psd")}}
+        parts = {name: optional(name + ".json") for name in ("series", "impacts", "psd")}
+        return {"job": self._job or self.document, **parts}
 
     def plot(self, *channels: str, figure: Any = None) -> Any:
         """A Matplotlib figure: each channel over time, and the spectrum below. Returns the figure.
@@ -847,13 +846,17 @@ class Study(Result):
 
     def _solution(self) -> dict[str, Any]:
         if self.kind == "calibrate":
-            return {_dotted(name): one["value"] for one in self.answer["parameters"] for name in one["pointers"] or [one["pointer"]]}
+            return self._values(self.answer["parameters"])
         best = self.answer["best"]
         if best is None:
             raise Problem({"title": "No candidate meets the constraints", "type": "/problems/infeasible", "status": 422,
                            "errors": self.answer["warnings"]})
-        values = {_dotted(name): one["value"] for one in best["values"] for name in one["pointers"] or [one["pointer"]]}
-        return {**values, **{one["metric"]: one["value"] for one in best["objectives"]}, "feasible": best["feasible"]}
+        objectives = {one["metric"]: one["value"] for one in best["objectives"]}
+        return {**self._values(best["values"]), **objectives, "feasible": best["feasible"]}
+
+    @staticmethod
+    def _values(axes: list[dict[str, Any]]) -> dict[str, Any]:
+        return {_dotted(name): one["value"] for one in axes for name in one["pointers"] or [one["pointer"]]}
 
     def best_scene(self, metric: Optional[str] = None, goal: str = "minimize") -> dict[str, Any]:
         """The scene of `best()`, ready for `lab.run`. For sweeps, optimisations and calibrations."""
@@ -890,12 +893,12 @@ def connect(url: Optional[str] = None, token: Optional[str] = None, *, ca_file: 
             timeout: float = 60, patience: float = 600, cancel_on_interrupt: bool = False) -> Lab:
     """Connects to a server and returns a Lab.
 
-    url       its address; by default that of IMPACTD_SERVER, else http://127.0.0.1:8080
-    token     needed beyond loopback (`impactd token create`); by default that of IMPACTD_TOKEN
-    ca_file   file of the certificate authority, where the server's certificate is not signed by a public one
-    timeout   seconds until a server that does not answer is given up
-    patience  seconds for which requests are repeated while the queue is full or the token's quota is used up
-    cancel_on_interrupt   whether Ctrl-C in run, a study or gather cancels the jobs; else they go on
+    url       its address; by default that of IMPACTD_SERVER, else http://127.0.0.1:8080.
+    token     needed beyond loopback (`impactd token create`); by default that of IMPACTD_TOKEN.
+    ca_file   file of the certificate authority, where the server's certificate is not signed by a public one.
+    timeout   seconds until a server that does not answer is given up.
+    patience  seconds for which requests are repeated while the queue is full or the token's quota is used up.
+    cancel_on_interrupt   whether Ctrl-C in run, a study or gather cancels the jobs; otherwise they continue.
 
     A Lab may be used by many threads. It closes its connections at the end of a `with` block:
 
@@ -907,12 +910,12 @@ def connect(url: Optional[str] = None, token: Optional[str] = None, *, ca_file: 
 
 
 class Lab:
-    """A server, as `connect` returns it. Scenes are given as
+    """A server, as `connect` returns it. A scene is one of these:
 
-    - a dict, as in the scene reference,
-    - the path of a JSON file (a string that ends with ".json", or a pathlib.Path),
-    - the name of an example (`lab.examples()`), such as "paper_free_sponge",
-    - or a Result, whose scene is used.
+    - a dict, as in the scene reference.
+    - the path of a JSON file: a string that ends with ".json", or a pathlib.Path.
+    - the name of an example (`lab.examples()`), such as "paper_free_sponge".
+    - a Result, whose scene is used.
 
     Keywords change the scene: `**{"dampers.0.clearance": 0.01}`, also as JSON Pointers, `"/dampers/0/clearance"`, and
     plain names, `duration=5`. A path that the scene cannot have raises Problem. The given scene is never changed.
@@ -981,9 +984,10 @@ class Lab:
 
     def _post(self, scene: Mapping[str, Any], prefer: str, key: Optional[str] = None) -> Job:
         # A retry under the same key cannot run the scene twice.
-        return Job(self, self._http.json("POST", "/v1/jobs", scene, {"Idempotency-Key": key or uuid.uuid4().hex, "Prefer": prefer}))
+        headers = {"Idempotency-Key": key or uuid.uuid4().hex, "Prefer": prefer}
+        return Job(self, self._http.json("POST", "/v1/jobs", scene, headers))
 
-    def _finish(self, scene: Mapping[str, Any], timeout: Optional[float], progress: Any) -> Result:
+    def _finish(self, scene: Mapping[str, Any], timeout: Optional[float], progress: Progress) -> Result:
         key, job = uuid.uuid4().hex, None
         try:
             job = self._post(scene, "wait=2", key)
@@ -1000,12 +1004,12 @@ class Lab:
                 (job or self._post(scene, "respond-async", key)).cancel()
             raise
 
-    def run(self, scene: Scene, *, timeout: Optional[float] = None, progress: Union[bool, Callable[[int, int], Any]] = False,
+    def run(self, scene: Scene, *, timeout: Optional[float] = None, progress: Progress = False,
             **overrides: Any) -> Result:
         """Runs a scene and returns its Result. Raises Problem with all faults if the scene is refused or fails.
 
-        timeout   seconds to wait; then TimeoutError, while the job goes on
-        progress  True: a line on standard error; or a function that is called with (per cent, 100)
+        timeout   seconds to wait; then TimeoutError, and the job continues.
+        progress  True: a line on standard error; or a function that is called with (per cent, 100).
 
             r = lab.run("paper_free_sponge", **{"dampers.0.clearance": 0.01}, duration=5)
         """
@@ -1035,13 +1039,13 @@ class Lab:
         return jobs
 
     def gather(self, jobs: Iterable[Union[Job, Scene]], *, ordered: bool = False, errors: str = "raise",
-               progress: Union[bool, Callable[[int, int], Any]] = False, cancel: Optional[bool] = None) -> Iterator[Any]:
+               progress: Progress = False, cancel: Optional[bool] = None) -> Iterator[Any]:
         """Yields the Result of each job as it finishes, with ordered=True in the given order.
 
-        errors    "raise": the Problem of a failed job is raised; "return": it is yielded in the place of the result
-        progress  True: a line on standard error; or a function that is called with (done, total)
+        errors    "raise": the Problem of a failed job is raised; "return": it is yielded in the place of the result.
+        progress  True: a line on standard error; or a function that is called with (done, total).
         cancel    whether Ctrl-C, or a loop that is left early, cancels the jobs that are not finished; by default as
-                  `cancel_on_interrupt` of connect says
+                  `cancel_on_interrupt` of connect says.
 
             jobs = lab.submit(lab.scene("paper_random_sponge", **{"excitation.seed": i}) for i in range(100))
             for r in lab.gather(jobs):
@@ -1069,13 +1073,16 @@ class Lab:
     # --- studies ---
 
     def study(self, kind: str, scene: Scene, *, timeout: Optional[float] = None,
-              progress: Union[bool, Callable[[int, int], Any]] = False, **members: Any) -> Study:
+              progress: Progress = False, **members: Any) -> Study:
         """Runs a study of any kind: the general call behind sweep, ensemble, optimize and the others.
 
-        Keywords with a dot or a slash, and the scene's own members (duration, output ...), change the scene; all others are members of the
-        study, as in the reference: `lab.study("ensemble", scene, runs=100, **{"dampers.0.clearance": 0.01})`.
+        Keywords with a dot or a slash, and the scene's own members (duration, output ...), change the scene; all others
+        are members of the study, as in the reference:
+
+            lab.study("ensemble", scene, runs=100, **{"dampers.0.clearance": 0.01})
         """
-        overrides = {name: members.pop(name) for name in list(members) if "." in name or "/" in name or name in _SCENE_MEMBERS}
+        overrides = {name: members.pop(name) for name in list(members)
+                     if "." in name or "/" in name or name in _SCENE_MEMBERS}
         document = self.scene(scene, **overrides)
         given = document.get("study") or {}
         document["study"] = {**(given if given.get("kind") == kind else {}), "kind": kind,
@@ -1094,7 +1101,7 @@ class Lab:
                                                 "dampers.0.buffer": ["sponge", "aluminium"]})
             s.table, s.best("rms_displacement"), s.best_scene("rms_displacement")
         """
-        return self.study("sweep", scene, axes=None if axes is None else _axes(axes), metrics=metrics, **members)
+        return self.study("sweep", scene, axes=_axes(axes), metrics=metrics, **members)
 
     def ensemble(self, scene: Scene, runs: Optional[int] = None, inputs: Any = None, **members: Any) -> Study:
         """Runs the scene with many seeds of its random base, or with uncertain inputs; answer["statistics"] has means
@@ -1103,9 +1110,10 @@ class Lab:
             lab.ensemble("paper_random_sponge", runs=100)
             lab.ensemble(scene, 256, inputs={"dampers.0.clearance": {"distribution": "uniform", "from": 0.013, "to": 0.017}})
         """
-        return self.study("ensemble", scene, runs=runs, inputs=None if inputs is None else _axes(inputs), **members)
+        return self.study("ensemble", scene, runs=runs, inputs=_axes(inputs), **members)
 
-    def optimize(self, scene: Scene, variables: Any = None, objectives: Any = None, constraints: Any = None, **members: Any) -> Study:
+    def optimize(self, scene: Scene, variables: Any = None, objectives: Any = None, constraints: Any = None,
+                 **members: Any) -> Study:
         """Finds the values that make one or two metrics best; `best()` has them, `best_scene()` is the scene.
 
         variables    {path: (from, to)} or {path: [values]}
@@ -1122,9 +1130,9 @@ class Lab:
         elif objectives is not None:
             objectives = [{"metric": one} if isinstance(one, str) else one for one in objectives]
         if isinstance(constraints, collections.abc.Mapping):
-            constraints = [{"metric": metric, **{name: value for name, value in zip(("min", "max"), limits) if value is not None}}
-                           for metric, limits in constraints.items()]
-        return self.study("optimize", scene, variables=None if variables is None else _axes(variables), objectives=objectives,
+            constraints = [{"metric": metric, **({} if low is None else {"min": low}), **({} if high is None else {"max": high})}
+                           for metric, (low, high) in constraints.items()]
+        return self.study("optimize", scene, variables=_axes(variables), objectives=objectives,
                           constraints=constraints, **members)
 
     def calibrate(self, scene: Scene, parameters: Any = None, measured: Any = None, **members: Any) -> Study:
@@ -1138,7 +1146,7 @@ class Lab:
         """
         if isinstance(measured, collections.abc.Mapping):
             measured = [measured]
-        return self.study("calibrate", scene, parameters=None if parameters is None else _axes(parameters), measured=measured, **members)
+        return self.study("calibrate", scene, parameters=_axes(parameters), measured=measured, **members)
 
     def response(self, scene: Scene, axis: Any = None, **members: Any) -> Study:
         """The steady motion under a sine while one number varies: periods, stability, peaks.
@@ -1149,7 +1157,8 @@ class Lab:
             axis = _axes(axis)[0]
         return self.study("response", scene, axis=axis, **members)
 
-    def fragility(self, scene: Scene, records: Optional[Sequence[str]] = None, levels: Any = None, limits: Any = None, **members: Any) -> Study:
+    def fragility(self, scene: Scene, records: Optional[Sequence[str]] = None, levels: Any = None, limits: Any = None,
+                  **members: Any) -> Study:
         """The intensity of ground motions at which limits are exceeded.
 
         records  names of uploaded ground motions
@@ -1208,7 +1217,10 @@ class Lab:
         return self._http.json("GET", f"/v1/materials/{_name(name)}")
 
     def add_material(self, slug: str, name: str, **members: Any) -> dict[str, Any]:
-        """Adds a material: `lab.add_material("felt", "Felt, 5 mm", restitution=0.31, contact_time=0.0042, source="own tests")`."""
+        """Adds a material; contact_time in s. Further keywords as in the reference of materials.
+
+            lab.add_material("felt", "Felt, 5 mm", restitution=0.31, contact_time=0.0042, source="own tests")
+        """
         return self._http.json("POST", "/v1/materials", {"slug": slug, "name": name, **members})
 
     def derived(self, material: str, damper_mass: float, structure_mass: float, **options: Any) -> dict[str, Any]:
@@ -1221,7 +1233,8 @@ class Lab:
 
         With dry_run=True it is only evaluated.
 
-            lab.measure("felt", {"impactor_mass": 0.11, "base": "fixed", "drops": [{"drop_height": 0.05, "rebound_height": 0.018}]})
+            lab.measure("felt", {"impactor_mass": 0.11, "base": "fixed",
+                                 "drops": [{"drop_height": 0.05, "rebound_height": 0.018}]})
         """
         return self._http.json("POST", f"/v1/materials/{_name(material)}/measurements" + ("?dry_run=1" if dry_run else ""), test)
 
@@ -1245,8 +1258,8 @@ class Lab:
     def upload(self, name: str, motion: Any, interval: Optional[float] = None, **members: Any) -> dict[str, Any]:
         """Uploads a ground motion: the path of a file (AT2, COSMOS, V1, two columns ...), or samples with their interval [s].
 
-        Keywords: unit ("g", "m/s^2" or "cm/s^2"), source, processing, earthquake, station, notes. The same motion under the same name may be
-        uploaded again.
+        Keywords: unit ("g", "m/s^2" or "cm/s^2"), source, processing, earthquake, station, notes. The same motion under
+        the same name may be uploaded again.
 
             lab.upload("elcentro", "RSN6_IMPVALL.I_I-ELC180.AT2", source="PEER, RSN6")
             lab.upload("pulse", [0, 1, 0], interval=0.02)
