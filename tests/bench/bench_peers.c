@@ -2,6 +2,9 @@
 // sample of 5 channels at 1 kHz, and what each missed within the first seconds against quad
 // precision, before rounding has grown to the motion's own size. Peers are slow: as many of
 // the 20 repeats as their share of time allows.
+//
+// `bench_peers curve` prints errors and CPU times of all solvers and peers at many steps and
+// tolerances as CSV: the paper's free vibration over 10 s, each run as a whole.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +14,9 @@
 #include "server/util/clock.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/peers.h"
+#include "tests/support/paper.h"
 
+static const double PEER_TOLERANCE = 1e-9;
 static const double JUDGED = 5;     // [s]
 static const double PATIENCE = 3e9; // of CPU for one peer and scene [ns]
 
@@ -39,28 +44,27 @@ static void measure(const ReferenceAnswer *truth, const double *displacement, co
         row->start_error = fmax(row->start_error, fabs(starts[i] - truth->impacts[i].start));
 }
 
-typedef bool Peer(const ReferenceScene *scene, PeerAnswer *answer);
-static bool cvode_plain(const ReferenceScene *scene, PeerAnswer *answer) {
-    return peer_cvode(scene, false, answer);
+typedef bool Peer(const ReferenceScene *scene, double tolerance, PeerAnswer *answer);
+static bool cvode_plain(const ReferenceScene *scene, double tolerance, PeerAnswer *answer) {
+    return peer_cvode(scene, tolerance, false, answer);
 }
-static bool cvode_stops(const ReferenceScene *scene, PeerAnswer *answer) {
-    return peer_cvode(scene, true, answer);
+static bool cvode_stops(const ReferenceScene *scene, double tolerance, PeerAnswer *answer) {
+    return peer_cvode(scene, tolerance, true, answer);
 }
 static const struct {
     const char *name;
     Peer *run;
-} peers[] = {{"GSL rk8pd 1e-9", peer_gsl},
-             {"CVODE BDF 1e-9, plain", cvode_plain},
-             {"CVODE BDF 1e-9, stops", cvode_stops}};
+} peers[] = {
+    {"GSL rk8pd", peer_gsl}, {"CVODE BDF, plain", cvode_plain}, {"CVODE BDF, stops", cvode_stops}};
 enum { GSL, CVODE_PLAIN, CVODE_STOPS, PEERS };
 
-static bool peer_time(size_t peer, const ReferenceScene *scene, const ReferenceAnswer *truth,
-                      PeerAnswer *answer, Row *row) {
+static bool peer_time(size_t peer, double tolerance, const ReferenceScene *scene,
+                      const ReferenceAnswer *truth, PeerAnswer *answer, Row *row) {
     row->ns = 1e300;
     const int64_t first = clock_thread_cpu_ns();
     for (row->repeats = 0; row->repeats < BENCH_REPEATS;) {
         const int64_t start = clock_thread_cpu_ns();
-        if (!peers[peer].run(scene, answer))
+        if (!peers[peer].run(scene, tolerance, answer))
             return false;
         const int64_t end = clock_thread_cpu_ns();
         row->ns = fmin(row->ns, (double)(end - start) / (double)answer->count);
@@ -116,7 +120,7 @@ static bool contest(const BenchCase *bench, BenchScene *scene) {
     if (!bench_run(scene, &times))
         return false;
     const double set = bench_memset(scene), copy = bench_memcpy(scene);
-    printf("%s, %g s\n  %-24s %10s %10s %8s %8s %13s %13s\n", bench->name, bench->duration, "",
+    printf("\"%s\", %g s\n  %-24s %10s %10s %8s %8s %13s %13s\n", bench->name, bench->duration, "",
            "ns/sample", "x memset", "repeats", "impacts", "x error", "start error");
     printf("  %-24s %10.2f %10.1f %8d\n", "memset", set, 1.0, BENCH_REPEATS);
     printf("  %-24s %10.2f %10.1f %8d\n", "memcpy", copy, copy / set, BENCH_REPEATS);
@@ -140,7 +144,7 @@ static bool contest(const BenchCase *bench, BenchScene *scene) {
     for (size_t i = 0; i < BENCH_CHANNELS; i++)
         answer.columns[i] = scene->block + i * scene->count;
     for (size_t i = 0; i < PEERS && is_good; i++) {
-        is_good = peer_time(i, &whole, &truth, &answer, &rows[i]);
+        is_good = peer_time(i, PEER_TOLERANCE, &whole, &truth, &answer, &rows[i]);
         if (is_good)
             print_row(peers[i].name, &rows[i], set);
     }
@@ -152,12 +156,87 @@ static bool contest(const BenchCase *bench, BenchScene *scene) {
     return is_good;
 }
 
-int main(void) {
+// CPU time [ms] and error of one setting of one of our solvers; false if it cannot run.
+static bool solver_time(const BenchCase *bench, const char *solver, const char *setting,
+                        double value, const ReferenceAnswer *truth, double *ms, double *error) {
+    Simulation simulation;
+    Problem problem;
+    problem_clear(&problem);
+    paper_scene(&simulation, bench->restitution, bench->contact_time, bench->duration);
+    paper_no_psd(&simulation);
+    simulation.output.reduction = false;
+    variant_free(simulation.accuracy);
+    simulation.accuracy = variant_new(kind_find(&solver_kinds, solver));
+    size_t offset = 0;
+    const Field *row = fields_find(simulation.accuracy->kind->fields, setting, &offset);
+    if (row != NULL)
+        *(double *)(void *)((char *)simulation.accuracy + offset + row->offset) = value;
+    Workspace workspace = {0};
+    Status status = simulation_complete(&simulation, NULL, NULL, &problem);
+    const int64_t first = clock_thread_cpu_ns();
+    *ms = 1e300;
+    for (int i = 0; i < BENCH_REPEATS && status == STATUS_OK; i++) {
+        Outcome *outcome = NULL;
+        Row missed = {0};
+        const int64_t start = clock_thread_cpu_ns();
+        status = simulation_run(&simulation, NULL, NULL, &workspace, &outcome, &problem);
+        const int64_t end = clock_thread_cpu_ns();
+        *ms = fmin(*ms, (double)(end - start) / 1e6);
+        if (status == STATUS_OK)
+            measure(truth, columns_find(&outcome->response.series, "displacement")->values, NULL, 0,
+                    &missed);
+        *error = missed.displacement_error;
+        outcome_unref(outcome);
+        if ((double)(end - first) > PATIENCE)
+            break;
+    }
+    workspace_clear(&workspace);
+    simulation_clear(&simulation);
+    return status == STATUS_OK;
+}
+
+static bool curve(const BenchCase *bench, BenchScene *scene) {
+    static const char *const stepped[] = {"precise", "rk4", "newmark"};
+    const ReferenceScene whole = reference_scene(bench, scene->plan, &scene->base);
+    ReferenceAnswer truth;
+    reference_quad(&whole, 1, 1e9, &truth);
+    if (!truth.is_whole)
+        return false;
+    double ms, error;
+    if (solver_time(bench, "exact", "", 0, &truth, &ms, &error))
+        printf("\"%s\",exact,,,%.4g,%.2e\n", bench->name, ms, error);
+    for (size_t i = 0; i < COUNT(stepped); i++)
+        for (double step = 1e-3; step > 0.9e-6; step /= 10)
+            if (solver_time(bench, stepped[i], "step", step, &truth, &ms, &error))
+                printf("\"%s\",%s,step,%g,%.4g,%.2e\n", bench->name, stepped[i], step, ms, error);
+    for (double tolerance = 1e-3; tolerance > 0.9e-13; tolerance /= 100)
+        if (solver_time(bench, "adaptive", "tolerance", tolerance, &truth, &ms, &error))
+            printf("\"%s\",adaptive,tolerance,%.0e,%.4g,%.2e\n", bench->name, tolerance, ms, error);
+    PeerAnswer answer = {.count = scene->count};
+    for (size_t i = 0; i < BENCH_CHANNELS; i++)
+        answer.columns[i] = scene->block + i * scene->count;
+    for (size_t i = 0; i <= CVODE_PLAIN; i++)
+        for (double tolerance = 1e-3; tolerance > 0.9e-13; tolerance /= 100) {
+            Row row;
+            if (peer_time(i, tolerance, &whole, &truth, &answer, &row))
+                printf("\"%s\",\"%s\",tolerance,%.0e,%.4g,%.2e\n", bench->name, peers[i].name,
+                       tolerance, row.ns * (double)scene->count / 1e6, row.displacement_error);
+        }
+    reference_clear(&truth);
+    return true;
+}
+
+int main(int argc, char **argv) {
+    const bool is_curve = argc > 1 && strcmp(argv[1], "curve") == 0;
     fft_start();
+    if (is_curve)
+        puts("scene,solver,setting,value,cpu_ms,error");
     for (size_t i = 0; i < bench_case_count; i++) {
+        if (is_curve && bench_cases[i].duration != 10)
+            continue;
         BenchScene scene;
-        const bool is_good =
-            bench_open(&bench_cases[i], &scene) && contest(&bench_cases[i], &scene);
+        const bool is_good = bench_open(&bench_cases[i], &scene) &&
+                             (is_curve ? curve : contest)(&bench_cases[i], &scene);
         bench_close(&scene);
         if (!is_good)
             return 1;

@@ -47,7 +47,7 @@ static int gaps(realtype t, N_Vector y, realtype *out, void *of) {
     return 0;
 }
 
-bool peer_cvode(const ReferenceScene *scene, bool has_stops, PeerAnswer *answer) {
+bool peer_cvode(const ReferenceScene *scene, double tolerance, bool has_stops, PeerAnswer *answer) {
     PeerSystem system;
     peer_system(scene, &system);
     SUNContext context = NULL;
@@ -61,9 +61,9 @@ bool peer_cvode(const ReferenceScene *scene, bool has_stops, PeerAnswer *answer)
     at[1] = scene->velocity;
     at[2] = at[3] = 0;
     for (int i = 0; i < 4; i++)
-        N_VGetArrayPointer(tolerances)[i] = PEER_TOLERANCE * system.scale[i];
+        N_VGetArrayPointer(tolerances)[i] = tolerance * system.scale[i];
     bool is_good = CVodeInit(cvode, has_stops ? slopes : slopes_anywhere, 0, y) == CV_SUCCESS &&
-                   CVodeSVtolerances(cvode, PEER_TOLERANCE, tolerances) == CV_SUCCESS &&
+                   CVodeSVtolerances(cvode, tolerance, tolerances) == CV_SUCCESS &&
                    CVodeSetUserData(cvode, &system) == CV_SUCCESS &&
                    CVodeSetLinearSolver(cvode, solver, J) == CV_SUCCESS &&
                    CVodeSetJacFn(cvode, jacobian) == CV_SUCCESS &&

@@ -48,14 +48,14 @@ static double locate(gsl_odeiv2_step *step, gsl_odeiv2_system *gsl, const PeerSy
     return s;
 }
 
-bool peer_gsl(const ReferenceScene *scene, PeerAnswer *answer) {
+bool peer_gsl(const ReferenceScene *scene, double tolerance, PeerAnswer *answer) {
     PeerSystem system;
     peer_system(scene, &system);
     gsl_odeiv2_system gsl = {slopes, NULL, 4, &system};
     gsl_odeiv2_step *step = gsl_odeiv2_step_alloc(gsl_odeiv2_step_rk8pd, 4);
     gsl_odeiv2_step *search = gsl_odeiv2_step_alloc(gsl_odeiv2_step_rk8pd, 4);
     gsl_odeiv2_control *control =
-        gsl_odeiv2_control_scaled_new(PEER_TOLERANCE, PEER_TOLERANCE, 1, 0, system.scale, 4);
+        gsl_odeiv2_control_scaled_new(tolerance, tolerance, 1, 0, system.scale, 4);
     gsl_odeiv2_evolve *evolve = gsl_odeiv2_evolve_alloc(4);
     bool is_good = step != NULL && search != NULL && control != NULL && evolve != NULL;
     double y[4] = {scene->displacement, scene->velocity, 0, 0}, t = 0;

@@ -10,7 +10,6 @@
 #include "tests/truth/reference.h"
 
 enum { PEER_STARTS = 10 };
-static const double PEER_TOLERANCE = 1e-9; // relative, and of each variable's scale
 
 // What a right-hand side sees; `stop` is +1 or -1 in contact with the right or left stop, else 0.
 typedef struct PeerSystem {
@@ -48,12 +47,12 @@ double peer_gap(const PeerSystem *system, const double *y, int stop);
 // ExactFlight ends at `stop`, or contact ends.
 void peer_switch(PeerSystem *system, double t, int stop, PeerAnswer *answer);
 
-// GSL's rk8pd, a step at most a sample; an event is searched for by steps of other lengths from the
-// last state.
-bool peer_gsl(const ReferenceScene *scene, PeerAnswer *answer);
+// `tolerance` is relative, and of each variable's scale. GSL's rk8pd, a step at most a sample; an
+// event is searched for by steps of other lengths from the last state.
+bool peer_gsl(const ReferenceScene *scene, double tolerance, PeerAnswer *answer);
 
 // SUNDIALS' CVODE: BDF, its root finding, a dense analytic Jacobian. With `has_stops` it is told to
 // stop at every sample of the base.
-bool peer_cvode(const ReferenceScene *scene, bool has_stops, PeerAnswer *answer);
+bool peer_cvode(const ReferenceScene *scene, double tolerance, bool has_stops, PeerAnswer *answer);
 
 #endif
