@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Error against CPU time of our solvers and of other libraries: measured, as a table, and as the chart of the guide.
 
-    tests/bench/precision.py --build build --measure tests/bench/epyc_7003/precision.csv    # two minutes of CPU
-    tests/bench/precision.py tests/bench/epyc_7003/precision.csv                            # the table
-    tests/bench/precision.py tests/bench/epyc_7003/precision.csv --svg web/guide/precision.svg
+    /usr/bin/python3 tests/bench/precision.py --build build --measure tests/bench/epyc_7003/precision.csv    # two minutes of CPU
+    /usr/bin/python3 tests/bench/precision.py tests/bench/epyc_7003/precision.csv                            # the table
+    /usr/bin/python3 tests/bench/precision.py tests/bench/epyc_7003/precision.csv --svg web/guide/precision.svg
 
 Measured are the paper's free vibrations over 10 s with 5 channels at 1 kHz: by `bench_peers curve` (our solvers, GSL, CVODE)
 and here by SciPy's solve_ivp with DOP853, whose events are the touches and the ends of contacts. The error is that of the
