@@ -17,7 +17,8 @@ as a terminal does. The words after the opening ``` say what a block is:
     ... not-run    shown only; a reason may follow. Other languages and `text` are shown only, too
 
 http://127.0.0.1:8080 and localhost:8080 become the address of the page's daemon; IMPACTD_SERVER is that
-address and impactd is on PATH. `test_recipes.py scripting` runs one page."""
+address and impactd is on PATH. `test_recipes.py scripting` runs one page. With UPDATE_TERMINALS=1 blocks `text
+terminal` are rewritten instead of compared."""
 
 import glob
 import json
@@ -200,7 +201,10 @@ class Page:
 
     def compare_terminal(self, block):
         """How the terminal differs from a block that shows it, or None."""
-        output = self.terminal()
+        output = re.sub(r"[ \t]+$", "", self.terminal().strip("\n"), flags=re.M) + "\n"
+        if os.environ.get("UPDATE_TERMINALS"):
+            block.text = output
+            return None
         shown, printed = (re.sub(r"\bin\s+[\d.]+\s+[mu]?s\b", "", text).split() for text in (block.text, output))
         return None if printed == shown else f"the terminal does not show this but:\n{output}"
 
@@ -272,6 +276,19 @@ def check(path):
                 assert fault is None, f"{path}:{block.line}: ```{block.language} {fault}"
         finally:
             page.close()
+    if os.environ.get("UPDATE_TERMINALS"):
+        update_terminals(path, found)
+
+
+def update_terminals(path, found):
+    """Writes the texts of blocks `text terminal` into the page."""
+    path = os.path.join(program.SOURCE, path)
+    with open(path, encoding="utf-8") as file:
+        lines = file.read().split("\n")
+    for block in reversed([block for block in found if block.language == "text" and "terminal" in block.words]):
+        lines[block.line - 1:lines.index("```", block.line - 1)] = block.text.split("\n")[:-1]
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("\n".join(lines))
 
 
 def page_test(path):
