@@ -16,8 +16,12 @@
 // times are those of its samples, which is usual, by the samples themselves. Its spectrum is that
 // of these values, so that both spectra have the same window, leakage and aliasing.
 //
-// A spectrum of K averaged segments has a relative deviation of about sqrt(1.06 / K) for Hann's
-// window and half overlap (Welch 1967). The noise of the measurement adds a constant density.
+// A spectrum of K averaged segments has a relative deviation of about d = sqrt(1.06 / K) for Hann's
+// window and half overlap (Welch 1967). The noise of the measurement adds a constant density N.
+// Where the motion can be predicted, its own density S does not scatter, and S + N has the variance
+// d^2 (N^2 + 2 N S). Compared are functions of the densities that have the same deviation d at all
+// frequencies: sqrt(1 + 2 S / N), or log(S + N) of motions that cannot be predicted and in screens,
+// where it has the wider valleys.
 #include "core/study/calibrate_search.h"
 
 #include <stdlib.h>
@@ -40,9 +44,11 @@ enum {
     RUNS_MAX = 1 << 22, // more than a search can ask for
 };
 
-static const double snap = 1e-8;       // of a sample interval: a time this close is a sample's
-static const double floor_share = 0.1; // of the measured densities lies below the noise's
-static const double floor_min = 1e-12; // of the largest density
+static const double snap = 1e-8; // of a sample interval: a time this close is a sample's
+// This share of the noise's densities lies below its quantile, of the normal distribution.
+static const double floor_share = 0.1, floor_quantile = -1.2816;
+static const double floor_min = 1e-8;  // of the largest density
+static const double square_min = 0.25; // of the function of a density: the rest is noise
 static const double variance_hann = 1.06;
 
 static const double window_growth = 1.4142; // of the length of windows
@@ -93,6 +99,12 @@ static Status measured_target_spectrum(const MeasuredTarget *target, const doubl
     return status;
 }
 
+// The function of a density that is compared.
+static double measured_target_scale(const MeasuredTarget *target, double density) {
+    return target->is_logarithmic ? log(fmax(density, target->floor))
+                                  : sqrt(fmax(2 * density / target->floor - 1, square_min));
+}
+
 static Status measured_target_make_spectrum(MeasuredTarget *target, const SpectrumRequest *psd) {
     const MeasuredChannel *measured = target->measured;
     const size_t max = target->samples / SEGMENTS_MIN;
@@ -106,19 +118,21 @@ static Status measured_target_make_spectrum(MeasuredTarget *target, const Spectr
     const size_t count = target->values.count;
     double *values = target->values.at;
     TRY(measured_target_spectrum(target, &measured->samples.at[target->first], NULL, values, NULL));
+    const size_t hop = welch->segment - welch->overlap;
+    const double segments = (double)((target->samples - welch->overlap) / hop);
+    target->deviation = sqrt(variance_hann / segments);
     Reals sorted = {NULL, 0};
     TRY(study_copy_reals(values, count, &sorted));
     reals_sort(sorted.at, count);
+    const double freedom = 2 / (target->deviation * target->deviation);
     target->floor = isnan(measured->deviation)
-                        ? sorted.at[(size_t)(floor_share * (double)count)]
+                        ? sorted.at[(size_t)(floor_share * (double)count)] * freedom /
+                              calibrate_chi_square(freedom, floor_quantile)
                         : 2 * measured->deviation * measured->deviation * measured->interval;
     target->floor = fmax(target->floor, floor_min * sorted.at[count - 1]);
     free(sorted.at);
     for (size_t i = 0; i < count; i++)
-        values[i] = log(fmax(values[i], target->floor));
-    const size_t hop = welch->segment - welch->overlap;
-    const double segments = (double)((target->samples - welch->overlap) / hop);
-    target->deviation = sqrt(variance_hann / segments);
+        values[i] = measured_target_scale(target, values[i]);
     return STATUS_OK;
 }
 
@@ -132,6 +146,7 @@ static Status measured_target_make(const CalibrateWork *work, size_t channel, do
     free(target->values.at);
     *target = (MeasuredTarget){.measured = measured,
                                .is_spectrum = work->fit == CALIBRATE_PSD,
+                               .is_logarithmic = work->is_chaotic || work->stage == STAGE_SCREEN,
                                .deviation = work->deviations[channel]};
     if (high < low)
         return STATUS_OK;
@@ -173,7 +188,9 @@ static Status measured_target_compare(const MeasuredTarget *target, const Respon
     if (target->is_spectrum)
         status = measured_target_spectrum(target, motion.at, cache, motion.at, problem);
     for (size_t i = 0; i < target->values.count && status == STATUS_OK; i++) {
-        const double value = target->is_spectrum ? log(motion.at[i] + target->floor) : motion.at[i];
+        const double value = target->is_spectrum
+                                 ? measured_target_scale(target, motion.at[i] + target->floor)
+                                 : motion.at[i];
         residual[i] = (value - target->values.at[i]) / target->deviation;
     }
     free(motion.at);
@@ -465,6 +482,7 @@ static Status calibrate_open(CalibrateWork *work, CalibrateStage stage) {
     const CalibrateStudy *study = work->study;
     const Simulation *simulation = work->work.simulation;
     const double duration = simulation->scene.duration, end = work->ends[work->window];
+    work->stage = stage;
     simulation_clear(&work->base);
     TRY(calibrate_make_base(&study->measured, simulation, end + study->max_shift, &work->base));
     free(work->points.at); // their costs are of other differences
@@ -548,8 +566,8 @@ static void calibrate_assess(CalibrateWork *work) {
     const LeastSquares *fit = &work->starts[0].fit;
     CalibrateAssessment *found = &work->assessment;
     const size_t n = work->variables;
-    const double share = work->fit == CALIBRATE_PSD ? calibrate_correlated_bins : 1;
-    const double freedom = fmax(floor((double)work->rows / share) - (double)n, 1);
+    const double freedom =
+        fmax(floor(calibrate_independent(work, (double)work->rows)) - (double)n, 1);
     bool is_estimated = work->fit == CALIBRATE_PSD;
     for (size_t c = 0; c < work->study->measured.count; c++)
         is_estimated |= isnan(work->study->measured.at[c].deviation);
@@ -679,6 +697,8 @@ static Status calibrate_advance(CalibrateWork *work) {
     // Spectra are compared over the whole record also where it cannot be predicted.
     work->is_chaotic = work->fit == CALIBRATE_PSD && !isnan(work->starts[0].horizon);
     calibrate_truncate_starts(work, (size_t)work->study->starts);
+    if (work->fit == CALIBRATE_PSD)
+        return calibrate_open(work, STAGE_FIT);
     calibrate_begin_stage(work, STAGE_FIT);
     return STATUS_OK;
 }

@@ -14,17 +14,15 @@ enum {
 };
 
 static const double calibrate_quantile_999 = 3.09; // of the normal distribution, one-sided
-// Sum of the squared correlations of neighbouring frequencies of a spectrum, for Hann's window.
-static const double calibrate_correlated_bins = 1.94;
 
 // The part of a measured channel that is compared. The measured channel is borrowed.
 typedef struct MeasuredTarget {
     const MeasuredChannel *measured;
     size_t first, samples; // the samples in it
-    bool is_spectrum;
+    bool is_spectrum, is_logarithmic;
     WelchSettings welch; // of a spectrum
     double floor;        // density of the noise, of both spectra
-    Reals values;     // compared: samples, or logarithms of densities from the second frequency on
+    Reals values;     // compared: samples, or functions of densities from the second frequency on
     double deviation; // of each
     size_t place;     // of the first value among those of all channels
 } MeasuredTarget;
@@ -134,6 +132,16 @@ static inline double calibrate_shift(const CalibrateWork *work, const double *at
     return work->variables > work->parameters
                ? (2 * at[work->parameters] - 1) * work->study->max_shift
                : 0;
+}
+
+// Of so many residuals. 1.94 is the sum of the squared correlations of neighbouring frequencies of
+// a spectrum, for Hann's window.
+static inline double calibrate_independent(const CalibrateWork *work, double residuals) {
+    return work->fit == CALIBRATE_PSD ? residuals / 1.94 : residuals;
+}
+
+static inline double calibrate_density(const MeasuredTarget *target, double value) {
+    return target->is_logarithmic ? exp(value) : target->floor * (1 + value * value) / 2;
 }
 
 static inline double calibrate_sum_squares(const double *values, size_t count) {

@@ -9,11 +9,12 @@
 #include "core/base/json_pointer.h"
 #include "core/study/calibrate_search.h"
 
-enum { SAMPLES_MIN = 16, SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000, LAGS = 20 };
+enum { SAMPLES_MIN = 16, SPECTRUM_SAMPLES_MIN = 64, MOTION_POINTS = 1000 };
 
 static const double structured = 0.05; // of the motion: rms of residuals that is not explained
-// Correlation of neighbouring residuals that are not noise, and the same in standard errors.
-static const double smooth_min = 0.2, smooth_errors = 4;
+// Correlation of neighbouring residuals that is not of noise, in standard errors, and that of
+// residuals that are not noise for the most part.
+static const double correlated_errors = 3.3, smooth_errors = 4, smooth_min = 0.2;
 static const double rms_min = 1e-100; // of samples and noise: squares of less underflow
 // Of the expected variance: spectra that differ. Those of chaotic motions scatter more than those
 // of noise: few strong impacts make most of them.
@@ -297,16 +298,13 @@ static Status calibrate_report_channel(CalibrateWork *work, size_t c) {
     const bool is_spectrum = target->is_spectrum;
     const size_t count = target->values.count;
     const double *own = work->starts[0].residual + target->place;
-    const double unit_size = is_spectrum ? 10 / log(10) : 1; // dB
     CalibrationResidual *residual = list_append(&work->answer->residuals, sizeof *residual);
     CalibrationMotion *motion = list_append(&work->answer->motions, sizeof *motion);
     TRY(status_made(residual != NULL && motion != NULL));
     size_t number;
     const Channel *channel = channel_find(measured->channel, &number);
-    residual->rms =
-        unit_size * target->deviation * sqrt(calibrate_sum_squares(own, count) / (double)count);
     residual->measured_rms = is_spectrum ? (double)NAN : measured_rms(measured);
-    residual->deviation = unit_size * (is_spectrum ? target->deviation : work->deviations[c]);
+    residual->deviation = is_spectrum ? 10 / log(10) * target->deviation : work->deviations[c];
     residual->samples = target->samples;
     motion->is_spectrum = is_spectrum;
     TRY(text_copy(measured->channel, &residual->channel));
@@ -314,30 +312,25 @@ static Status calibrate_report_channel(CalibrateWork *work, size_t c) {
     TRY(text_copy(measured->channel, &motion->channel));
     TRY(text_copy(is_spectrum ? channel->psd_unit : channel->unit, &motion->unit));
     const size_t stride = (count + MOTION_POINTS - 1) / MOTION_POINTS;
-    for (size_t i = 0; i < count; i += stride) {
-        const double value = target->values.at[i], fitted = value + target->deviation * own[i];
-        const double bin = (double)(i + 1) / ((double)target->welch.segment * measured->interval);
-        TRY(study_add_real(is_spectrum ? bin : measured_time(measured, target->first + i),
-                           &motion->at));
-        TRY(study_add_real(is_spectrum ? exp(value) : value, &motion->measured));
-        TRY(study_add_real(is_spectrum ? exp(fitted) : fitted, &motion->fitted));
+    double squares = 0;
+    for (size_t i = 0; i < count; i++) {
+        double value = target->values.at[i], fitted = value + target->deviation * own[i];
+        double difference = fitted - value, at = measured_time(measured, target->first + i);
+        if (is_spectrum) {
+            value = calibrate_density(target, value);
+            fitted = calibrate_density(target, fitted);
+            difference = 10 * log10(fitted / value); // dB
+            at = (double)(i + 1) / ((double)target->welch.segment * measured->interval);
+        }
+        squares += difference * difference;
+        if (i % stride != 0)
+            continue;
+        TRY(study_add_real(at, &motion->at));
+        TRY(study_add_real(value, &motion->measured));
+        TRY(study_add_real(fitted, &motion->fitted));
     }
+    residual->rms = sqrt(squares / (double)count);
     return STATUS_OK;
-}
-
-// Whether residuals are correlated in time (Ljung and Box 1978).
-static bool calibrate_is_correlated(const double *residual, size_t count) {
-    const double squares = calibrate_sum_squares(residual, count), n = (double)count;
-    double sum = 0;
-    const size_t lags = count / 4 < LAGS ? count / 4 : LAGS;
-    for (size_t lag = 1; lag <= lags; lag++) {
-        double products = 0;
-        for (size_t i = lag; i < count; i++)
-            products += residual[i] * residual[i - lag];
-        sum += products * products / (squares * squares) / (n - (double)lag);
-    }
-    return squares > 0 &&
-           n * (n + 2) * sum > calibrate_chi_square((double)lags, calibrate_quantile_999);
 }
 
 // The sentence if the model does not explain a spectrum. Compared are the frequencies at which the
@@ -346,40 +339,36 @@ static bool calibrate_is_correlated(const double *residual, size_t count) {
 static Status calibrate_check_spectrum(CalibrateWork *work, const MeasuredTarget *target,
                                        const CalibrationResidual *residual) {
     const double *own = work->starts[0].residual + target->place, deviation = target->deviation;
-    // The floor is a low quantile of the noise's densities.
-    const double noise = log(target->floor) + 1.5 * calibrate_quantile_999 * deviation;
+    const double noise = target->floor * exp(calibrate_quantile_999 * deviation);
     double squares = 0, bins = 0;
     for (size_t i = 0; i < target->values.count; i++) {
         const double value = target->values.at[i];
-        if (fmax(value, value + deviation * own[i]) <= noise)
+        if (calibrate_density(target, fmax(value, value + deviation * own[i])) <= noise)
             continue;
         squares += own[i] * own[i];
         bins++;
     }
     // Two estimated spectra, if both are of motions that cannot be predicted.
     const double expected = work->is_chaotic ? 2 : 1;
-    const double freedom = fmax(bins / calibrate_correlated_bins, 1);
+    const double freedom = fmax(calibrate_independent(work, bins), 1);
     const double scatter = calibrate_chi_square(freedom, calibrate_quantile_999) / freedom;
     const double misfit = work->is_chaotic ? spectrum_misfit_chaos : spectrum_misfit;
     if (squares <= fmax(misfit, scatter) * expected * bins)
         return STATUS_OK;
-    return status_made(
-        text_format(&work->answer->detail,
-                    "the spectrum of %s differs from the best fit by %.2g dB rms where the motion "
-                    "exceeds the noise, and %.2g dB would be expected of spectra of this length",
-                    residual->channel, residual->deviation * sqrt(squares / bins),
-                    residual->deviation * sqrt(expected)));
+    return status_made(text_format(
+        &work->answer->detail,
+        "the spectrum of %s differs from the best fit, where the motion exceeds the noise, by %.2g "
+        "times the deviation that is expected of spectra of this length",
+        residual->channel, sqrt(squares / (expected * bins))));
 }
 
-// Whether residuals differ less from one to the next than those of noise do: the mean square of
-// these differences is 2 (1 - r) times the variance, of noise with |r| of 1 / sqrt(count) (von
-// Neumann 1941).
-static bool calibrate_is_smooth(const double *residual, size_t count) {
+// The correlation r of neighbouring residuals: the mean square of their differences is 2 (1 - r)
+// times the variance, and |r| of noise is about 1 / sqrt(count) (von Neumann 1941).
+static double calibrate_neighbours(const double *residual, size_t count) {
     double differences = 0;
     for (size_t i = 1; i < count; i++)
         differences += (residual[i] - residual[i - 1]) * (residual[i] - residual[i - 1]);
-    const double correlation = 1 - differences / (2 * calibrate_sum_squares(residual, count));
-    return correlation > fmax(smooth_min, smooth_errors / sqrt((double)count));
+    return 1 - differences / (2 * calibrate_sum_squares(residual, count));
 }
 
 // The sentence if the model does not explain a channel, whose noise was not given.
@@ -396,10 +385,12 @@ static Status calibrate_check_channel_fit(CalibrateWork *work, size_t c) {
                                        "the differences of %s from the best fit, %.2g %s rms, are "
                                        "as large as the measured motion, %.2g %s rms",
                                        name, rms, unit, motion, unit));
-    const double *own = work->starts[0].residual + target->place;
-    if (!calibrate_is_correlated(own, target->values.count))
+    const double correlation =
+        calibrate_neighbours(work->starts[0].residual + target->place, target->values.count);
+    const double noise = 1 / sqrt((double)target->values.count);
+    if (!(fabs(correlation) > correlated_errors * noise))
         return STATUS_OK;
-    if (rms >= structured * motion || calibrate_is_smooth(own, target->values.count))
+    if (rms >= structured * motion || correlation > fmax(smooth_min, smooth_errors * noise))
         return status_made(text_format(
             &answer->detail,
             "the differences of %s from the best fit, %.2g %s rms or %.2g %% of the motion, are "

@@ -4,6 +4,8 @@
 //
 //   truth_test_calibrate_c [TRIALS [SEED [KIND]]]
 //
+// One trial in SPECTRA_SHARE is added whose spectra are fitted.
+//
 // Which of both a set is follows from the Fisher information at the true values, computed here: it
 // is determined if the interval is at most 0.35 of the range half wide, undetermined if it is at
 // least as wide as the range; sets between are not counted. Noise is 1 to 10 % of each channel.
@@ -34,7 +36,7 @@ typedef struct Trial {
     double truth[CALIBRATE_PARAMETERS], from[CALIBRATE_PARAMETERS], to[CALIBRATE_PARAMETERS];
     double max_shift, shift;
     bool is_given; // the deviations
-    bool is_degenerate;
+    bool is_degenerate, is_spectrum;
 } Trial;
 
 static void parameter_add(Trial *trial, Draws *draws, const char *pointer, double truth) {
@@ -48,7 +50,8 @@ static void parameter_add(Trial *trial, Draws *draws, const char *pointer, doubl
              trial->from[i], trial->to[i]);
 }
 
-enum { KINDS = 13, TIMED = 5 };
+// Those from MOTIONS on fit spectra.
+enum { MOTIONS = 13, KINDS = 16, SPECTRA_SHARE = 4, TIMED = 5 };
 static const char *const kind_names[KINDS] = {"free: e, T_c",
                                               "free, no damper: K, damping ratio",
                                               "sine: clearance, e",
@@ -61,7 +64,10 @@ static const char *const kind_names[KINDS] = {"free: e, T_c",
                                               "M and K, free",
                                               "M, K, damping ratio, random",
                                               "K, e without a contact",
-                                              "frame: all masses and stiffnesses"};
+                                              "frame: all masses and stiffnesses",
+                                              "spectrum: free, K, damping ratio",
+                                              "spectrum: random, K, damping ratio",
+                                              "spectrum: frame, stiffness, damping ratio"};
 
 static void trial_draw(Draws *draws, int kind, Trial *trial) {
     *trial = (Trial){.channels = {"displacement"}, .channel_count = 1};
@@ -71,17 +77,19 @@ static void trial_draw(Draws *draws, int kind, Trial *trial) {
                  share = draws_uniform(draws, 0.05, 0.2);
     const double restitution = draws_uniform(draws, 0.35, 0.75);
     const double contact = draws_scattered(draws, 0.03, 0.15) / frequency;
-    const double cycles = draws_uniform(draws, 12, 25);
+    trial->is_spectrum = kind >= MOTIONS;
+    const double cycles = draws_uniform(draws, 12, 25) * (trial->is_spectrum ? 3 : 1);
     double motion = 0.01, clearance = motion * draws_uniform(draws, 0.6, 1.6);
     char excitation[400], structure[400];
-    const bool has_damper = kind != 1 && kind != 5 && kind != 9 && kind != 10 && kind != 12;
+    const bool has_damper = kind != 1 && kind != 5 && kind != 9 && kind != 10 && kind < 12;
+    const bool is_frame = kind == 5 || kind == 12 || kind == 15;
     snprintf(excitation, sizeof excitation, "{\"kind\": \"free\", \"displacement\": %.17g}",
              motion);
     if (kind == 2 || kind == 8)
         snprintf(excitation, sizeof excitation,
                  "{\"kind\": \"sine\", \"frequency\": %.17g, \"amplitude\": %.17g}",
                  frequency * draws_uniform(draws, 0.9, 1.1), motion * omega * omega * 0.3);
-    if (kind == 3 || kind == 10)
+    if (kind == 3 || kind == 10 || kind == 14 || kind == 15)
         snprintf(excitation, sizeof excitation,
                  "{\"kind\": \"random\", \"band\": [0, %.17g], \"rms\": %.17g, \"seed\": %llu}",
                  3 * frequency, motion * omega * omega * 0.4,
@@ -89,13 +97,15 @@ static void trial_draw(Draws *draws, int kind, Trial *trial) {
     snprintf(structure, sizeof structure,
              "{\"mass\": %.17g, \"stiffness\": %.17g, \"damping_ratio\": %.17g}", mass, stiffness,
              ratio);
-    if (kind == 5 || kind == 12) {
+    if (is_frame) {
         snprintf(structure, sizeof structure,
                  "{\"kind\": \"frame\", \"masses\": [%.17g, %.17g], \"stiffnesses\": [%.17g, "
                  "%.17g], \"damping_ratio\": %.17g}",
                  mass, mass, 2.6 * stiffness, 2.2 * stiffness, ratio);
-        snprintf(excitation, sizeof excitation,
-                 "{\"kind\": \"free\", \"displacement\": [%.17g, %.17g]}", 0.4 * motion, motion);
+        if (kind != 15)
+            snprintf(excitation, sizeof excitation,
+                     "{\"kind\": \"free\", \"displacement\": [%.17g, %.17g]}", 0.4 * motion,
+                     motion);
         trial->channels[0] = "displacement_2";
     }
     if (kind == 11)
@@ -112,7 +122,7 @@ static void trial_draw(Draws *draws, int kind, Trial *trial) {
              structure, damper, kind == 7 ? "impulse" : "auto", excitation, cycles / frequency,
              40 * frequency);
     trial->is_given = draws_chance(draws, 0.5);
-    trial->is_degenerate = kind >= 9;
+    trial->is_degenerate = kind >= 9 && !trial->is_spectrum;
     if (kind == 6) {
         trial->channels[1] = "acceleration";
         trial->channel_count = 2;
@@ -126,9 +136,9 @@ static void trial_draw(Draws *draws, int kind, Trial *trial) {
                       buffer_t[] = "/dampers/0/buffer/contact_time", gap[] = "/dampers/0/clearance";
     if (kind == 9 || kind == 10)
         parameter_add(trial, draws, "/structure/mass", mass);
-    if (kind == 1 || kind == 4 || (kind >= 9 && kind <= 11))
+    if (kind == 1 || kind == 4 || (kind >= 9 && kind <= 11) || kind == 13 || kind == 14)
         parameter_add(trial, draws, "/structure/stiffness", stiffness);
-    if (kind == 1 || kind == 10)
+    if (kind == 1 || kind == 10 || (kind >= 13 && kind <= 15))
         parameter_add(trial, draws, "/structure/damping_ratio", ratio);
     if (kind == 8)
         parameter_add(trial, draws, "/dampers/0/mass", share * mass);
@@ -149,9 +159,10 @@ static void trial_draw(Draws *draws, int kind, Trial *trial) {
         parameter_add(trial, draws, "/structure/masses/0", mass);
         parameter_add(trial, draws, "/structure/masses/1", mass);
     }
-    if (kind == 5 || kind == 12) {
+    if (is_frame) {
         parameter_add(trial, draws, "/structure/stiffnesses/0", 2.6 * stiffness);
-        parameter_add(trial, draws, "/structure/stiffnesses/1", 2.2 * stiffness);
+        if (kind != 15)
+            parameter_add(trial, draws, "/structure/stiffnesses/1", 2.2 * stiffness);
     }
 }
 
@@ -194,7 +205,7 @@ static void scene_run(const CalibrateStudy *study, const Simulation *simulation,
 typedef struct Tally {
     unsigned long trials, determined, undetermined, between, wrong_determined, wrong_undetermined,
         not_explained, intervals, contained, lost;
-    double cpu, runs, alone;
+    double cpu, runs, alone, log_width; // of errors over those of the Fisher information
 } Tally;
 static Tally tallies[KINDS];
 
@@ -266,12 +277,13 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
         fail_msg("%s", problem.detail);
     double deviation[2], motion_rms[2];
     double *measured = calloc(2 * count, sizeof *measured), true_cost = 0;
-    size_t at =
-        (size_t)snprintf(text, sizeof text,
-                         "%s, \"output\": {\"channels\": [%s], \"psd\": {\"channels\": []}}, "
-                         "\"study\": {\"kind\": \"calibrate\", \"parameters\": [%s], "
-                         "\"max_shift\": %.17g, \"measured\": [",
-                         trial->scene, names, trial->parameters, trial->max_shift);
+    size_t at = (size_t)snprintf(
+        text, sizeof text,
+        "%s, \"output\": {\"channels\": [%s], \"psd\": {\"channels\": []}}, "
+        "\"study\": {\"kind\": \"calibrate\", \"parameters\": [%s], "
+        "\"fit\": \"%s\", \"max_shift\": %.17g, \"measured\": [",
+        trial->scene, names, trial->parameters,
+        calibrate_fit_names[trial->is_spectrum ? CALIBRATE_PSD : CALIBRATE_TIME], trial->max_shift);
     const long moved = lround(trial->shift * rate * (double)fine);
     trial->shift = (double)moved / rate / (double)fine;
     for (size_t c = 0; c < trial->channel_count; c++) {
@@ -371,18 +383,21 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
                                   trial->truth[i] <= parameter->interval_95.at[1];
         const double off = fabs(parameter->value - trial->truth[i]) / parameter->standard_error;
         tally->intervals++;
+        tally->log_width += log(parameter->standard_error / (trial->to[i] - trial->from[i]) /
+                                sqrt(covariance[i * (trial->count + 1)]));
         tally->contained += is_contained;
         is_lost |= off > 6 && !is_contained;
         if (!is_contained && getenv("CALIBRATE_MISSED") != NULL)
             printf("missed %llu kind %d %zu/%zu: off %.2f, outside by %.2g of the interval, cost "
                    "%.6g truth %.6g, "
-                   "samples %llu of %zu, widest %.2g %s\n",
+                   "samples %llu of %zu, widest %.2g %s, error %.2g of the range\n",
                    (unsigned long long)number, kind, i, trial->count, off,
                    fmax(parameter->interval_95.at[0] - trial->truth[i],
                         trial->truth[i] - parameter->interval_95.at[1]) /
                        (parameter->interval_95.at[1] - parameter->interval_95.at[0]),
                    fit_cost, true_cost, (unsigned long long)answer->residuals.at[0].samples, count,
-                   widest, answer->fit == CALIBRATE_PSD ? "PSD" : "");
+                   widest, answer->fit == CALIBRATE_PSD ? "PSD" : "",
+                   parameter->standard_error / (trial->to[i] - trial->from[i]));
         if (getenv("CALIBRATE_VERBOSE") != NULL)
             printf("   %zu: true %.6g fit %.6g +- %.3g (%.1f)\n", i, trial->truth[i],
                    parameter->value, parameter->standard_error, off);
@@ -425,42 +440,59 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
 
 static void tally_print(const char *name, const Tally *tally) {
     printf("%-36s %5lu trials, determined %4lu (wrong %3lu), not %4lu (wrong %3lu), intervals "
-           "%5lu hold %5.1f %%, not explained %lu, lost %lu, runs %.0f, CPU over that of the runs "
+           "%5lu hold %5.1f %%, errors %.2f of the smallest possible, not explained %lu, lost %lu, "
+           "runs %.0f, CPU over that of the runs "
            "%.2f\n",
            name, tally->trials, tally->determined, tally->wrong_determined, tally->undetermined,
            tally->wrong_undetermined, tally->intervals,
-           100 * (double)tally->contained / (double)tally->intervals, tally->not_explained,
-           tally->lost, tally->runs / (double)tally->trials, tally->cpu / tally->alone);
+           100 * (double)tally->contained / (double)tally->intervals,
+           exp(tally->log_width / (double)tally->intervals), tally->not_explained, tally->lost,
+           tally->runs / (double)tally->trials, tally->cpu / tally->alone);
+}
+
+static void tally_add(const Tally *tally, Tally *sum) {
+    const unsigned long *from = &tally->trials;
+    unsigned long *to = &sum->trials;
+    for (size_t k = 0; k < 10; k++)
+        to[k] += from[k];
+    sum->log_width += tally->log_width;
+    sum->cpu += tally->cpu;
+    sum->runs += tally->runs;
+    sum->alone += tally->alone;
+}
+
+static void tally_check(const Tally *sum) {
+    const double share = (double)sum->contained / (double)sum->intervals;
+    assert_true(share >= 0.92 && share <= 0.98);
+    assert_true((double)sum->wrong_determined <= 0.05 * (double)sum->determined);
+    assert_true((double)sum->wrong_undetermined <= 0.05 * (double)sum->undetermined);
+}
+
+static void trials_run(unsigned long i, int kind) {
+    Draws draws = {(seed * 1000003 + i) * 0x2545f4914f6cdd1dU};
+    trial_run(&draws, kind, seed * 1000003 + i);
 }
 
 TEST(intervals_contain_the_true_values_and_undetermined_sets_are_reported) {
-    Tally sum = {0};
+    Tally motions = {0}, spectra = {0};
     const char *first = getenv("CALIBRATE_FIRST");
-    for (unsigned long i = first ? strtoul(first, NULL, 10) : 0; i < trials; i++) {
-        const int kind = only >= 0 ? only : (int)(i % KINDS);
-        Draws draws = {(seed * 1000003 + i) * 0x2545f4914f6cdd1dU};
-        trial_run(&draws, kind, seed * 1000003 + i);
-    }
+    for (unsigned long i = first ? strtoul(first, NULL, 10) : 0; i < trials; i++)
+        trials_run(i, only >= 0 ? only : (int)(i % MOTIONS));
+    for (unsigned long i = 0; i < trials / SPECTRA_SHARE && only < 0; i++)
+        trials_run(i, MOTIONS + (int)(i % (KINDS - MOTIONS)));
     for (int kind = 0; kind < KINDS; kind++) {
         const Tally *tally = &tallies[kind];
         if (tally->trials == 0)
             continue;
         tally_print(kind_names[kind], tally);
-        const unsigned long *from = &tally->trials;
-        unsigned long *to = &sum.trials;
-        for (size_t k = 0; k < 10; k++)
-            to[k] += from[k];
-        sum.cpu += tally->cpu;
-        sum.runs += tally->runs;
-        sum.alone += tally->alone;
+        tally_add(tally, kind < MOTIONS ? &motions : &spectra);
     }
-    tally_print("all", &sum);
+    tally_print("motions", &motions);
+    tally_print("spectra", &spectra);
     if (trials < 100)
         return;
-    const double share = (double)sum.contained / (double)sum.intervals;
-    assert_true(share >= 0.92 && share <= 0.98);
-    assert_true((double)sum.wrong_determined <= 0.05 * (double)sum.determined);
-    assert_true((double)sum.wrong_undetermined <= 0.05 * (double)sum.undetermined);
+    tally_check(&motions);
+    tally_check(&spectra);
 }
 
 int main(int argc, char **argv) {
