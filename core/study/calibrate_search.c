@@ -703,10 +703,16 @@ static Status calibrate_advance(CalibrateWork *work) {
     return STATUS_OK;
 }
 
+double calibrate_expect_runs(const CalibrateStudy *study, const Simulation *simulation,
+                             double windows) {
+    const double iterations = simulation->scene.dampers.count > 0 ? 10 : 4;
+    const double variables = (double)study->parameters.count + (study->max_shift > 0);
+    return (double)study->starts * windows * (SCREENED + iterations * (variables + 1)) + EXPLORED;
+}
+
 static void calibrate_estimate_runs(CalibrateWork *work) {
-    // Most of them are short.
     const size_t expected =
-        (size_t)work->study->starts * (130 + 20 * (work->parameters + 1)) + EXPLORED;
+        (size_t)calibrate_expect_runs(work->study, work->work.simulation, (double)work->windows);
     work->work.expected = work->work.wanted > expected ? work->work.wanted : expected;
 }
 

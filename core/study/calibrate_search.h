@@ -173,6 +173,10 @@ static inline double calibrate_value(const StudyAxis *axis, double u) {
 Status calibrate_make_base(const MeasuredChannels *measured, const Simulation *simulation,
                            double end, Simulation *base);
 
+// Runs that a search makes on average, in so many windows.
+double calibrate_expect_runs(const CalibrateStudy *study, const Simulation *simulation,
+                             double windows);
+
 // The functions of the StudyKind of these names.
 Status calibrate_begin(void *work, const StudyTools *tools, Problem *problem);
 Status calibrate_scene(const void *work, size_t member, Simulation *scene, StudyPart *part,

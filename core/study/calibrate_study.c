@@ -117,9 +117,9 @@ static Status calibrate_check_channel(const CalibrateStudy *study, const Simulat
     Status status = STATUS_OK;
     if (end > duration * (1 + 1e-9))
         status = json_pointer_fault(problem, place.at, "samples",
-                                    "end at %s s, the scene ends at %s s: give the scene a longer "
-                                    "duration, or fewer samples",
-                                    real_text(end).at, real_text(duration).at);
+                                    "end at %.12g s, the scene ends at %.12g s: give the scene a "
+                                    "longer duration, or fewer samples",
+                                    end, duration);
     else if (!((to - from) / measured.interval + 1.000001 >= (double)min))
         status = json_pointer_fault(problem, place.at, "samples",
                                     "must be at least %zu within the scene%s, for a fit of %s", min,
@@ -224,14 +224,13 @@ static Status calibrate_complete(void *request, const Simulation *simulation,
 static Status calibrate_cost(const void *request, const Simulation *simulation,
                              const SimulationLimits *limits, double *steps) {
     const CalibrateStudy *study = request;
-    const double variables = (double)study->parameters.count + 1;
-    const double runs = (double)study->starts * (50 + 10 * variables) + 250; // of full length
+    const double windows = study->fit == CALIBRATE_PSD ? 1 : 3.4; // in lengths of the last
     Simulation base = {0};
     (void)limits;
     const Status status =
         calibrate_make_base(&study->measured, simulation, simulation->scene.duration, &base);
     if (status == STATUS_OK)
-        *steps = runs * simulation_cost(&base).steps;
+        *steps = calibrate_expect_runs(study, simulation, windows) * simulation_cost(&base).steps;
     simulation_clear(&base);
     return status;
 }

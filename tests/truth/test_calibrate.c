@@ -206,6 +206,7 @@ typedef struct Tally {
     unsigned long trials, determined, undetermined, between, wrong_determined, wrong_undetermined,
         not_explained, intervals, contained, lost;
     double cpu, runs, alone, log_width; // of errors over those of the Fisher information
+    double cost;                        // largest, over the predicted one
 } Tally;
 static Tally tallies[KINDS];
 
@@ -363,6 +364,10 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
     Tally *tally = &tallies[kind];
     const Calibration *answer = (const Calibration *)(const void *)made;
     tally->runs += (double)answer->made.runs;
+    double predicted = 0;
+    assert_int_equal(study_calibrate.cost(request.study, &request.simulation, NULL, &predicted),
+                     STATUS_OK);
+    tally->cost = fmax(tally->cost, answer->made.steps / predicted);
     if (number % TIMED == 0)
         runs_time(&request, tally);
     tally->trials++;
@@ -441,13 +446,13 @@ static void trial_run(Draws *draws, int kind, uint64_t number) {
 static void tally_print(const char *name, const Tally *tally) {
     printf("%-36s %5lu trials, determined %4lu (wrong %3lu), not %4lu (wrong %3lu), intervals "
            "%5lu hold %5.1f %%, errors %.2f of the smallest possible, not explained %lu, lost %lu, "
-           "runs %.0f, CPU over that of the runs "
+           "runs %.0f, steps at most %.2f of the predicted, CPU over that of the runs "
            "%.2f\n",
            name, tally->trials, tally->determined, tally->wrong_determined, tally->undetermined,
            tally->wrong_undetermined, tally->intervals,
            100 * (double)tally->contained / (double)tally->intervals,
            exp(tally->log_width / (double)tally->intervals), tally->not_explained, tally->lost,
-           tally->runs / (double)tally->trials, tally->cpu / tally->alone);
+           tally->runs / (double)tally->trials, tally->cost, tally->cpu / tally->alone);
 }
 
 static void tally_add(const Tally *tally, Tally *sum) {
@@ -456,12 +461,14 @@ static void tally_add(const Tally *tally, Tally *sum) {
     for (size_t k = 0; k < 10; k++)
         to[k] += from[k];
     sum->log_width += tally->log_width;
+    sum->cost = fmax(sum->cost, tally->cost);
     sum->cpu += tally->cpu;
     sum->runs += tally->runs;
     sum->alone += tally->alone;
 }
 
 static void tally_check(const Tally *sum) {
+    assert_true(sum->cost < 5);
     const double share = (double)sum->contained / (double)sum->intervals;
     assert_true(share >= 0.92 && share <= 0.98);
     assert_true((double)sum->wrong_determined <= 0.05 * (double)sum->determined);
