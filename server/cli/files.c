@@ -244,6 +244,6 @@ Progress progress_bar_watch(ProgressBar *bar) {
 
 void progress_bar_stop(ProgressBar *bar) {
     if (bar->is_drawn)
-        fputs("\r\033[K", stderr);
+        fprintf(stderr, "\r%*s\r", BAR_WIDTH + 32, "");
     bar->is_drawn = false;
 }

@@ -35,13 +35,18 @@ void report_title(Report *report, const char *title) {
     text_make_printable(report->title);
 }
 
+static const char *report_fit(char text[1000], const char *format, va_list arguments) {
+    text_fit_format(text, 1000, format, arguments);
+    text_make_printable(text);
+    return text;
+}
+
 void report_sentence(Report *report, const char *format, ...) {
     char text[1000];
     va_list arguments;
     va_start(arguments, format);
-    text_fit_format(text, sizeof text, format, arguments);
+    (void)report_fit(text, format, arguments);
     va_end(arguments);
-    text_make_printable(text);
     if (text[0] >= 'a' && text[0] <= 'z')
         text[0] = (char)(text[0] - 'a' + 'A');
     if (texts_append(&report->sentences, text) != STATUS_OK)
@@ -49,14 +54,14 @@ void report_sentence(Report *report, const char *format, ...) {
 }
 
 void report_next(Report *report, const char *format, ...) {
-    char text[1000];
+    char text[1000], *last = report->next;
     va_list arguments;
     va_start(arguments, format);
-    text_fit_format(text, sizeof text, format, arguments);
+    report->is_failed =
+        text_copy(report_fit(text, format, arguments), &report->next) != STATUS_OK ||
+        report->is_failed;
     va_end(arguments);
-    text_make_printable(text);
-    free(report->next);
-    report->is_failed = text_copy(text, &report->next) != STATUS_OK || report->is_failed;
+    free(last);
 }
 
 void report_notes(Report *report, const Warnings *warnings) {
@@ -360,10 +365,11 @@ void report_write_page(Report *report, const ReportPage *page, Bytes *bytes) {
     bytes_clear(&scene);
     bytes_format(bytes, "<footer>\n<p>Made by impactd %s, engine %s. ", program_version,
                  engine_version);
-    page_put(bytes, "Result <code>", page->result,
-             "</code>: the SHA-256 of scene and engine, so that equal results have equal ids.</p>\n"
-             "<p>To cite: the version of impactd and the id above, and K. Li and A. P. Darby, "
-             "Modelling a buffered impact damper system using a spring-damper model of impact, "
-             "Structural Control and Health Monitoring 16 (2009), doi:10.1002/stc.238.</p>\n"
-             "</footer>\n</main>\n</body>\n</html>\n");
+    page_put(
+        bytes, "Result <code>", page->result,
+        "</code>: the SHA-256 of scene and engine, so that equal results have equal ids.</p>\n"
+        "<p>To cite: the version of impactd and the id above, and K. Li and A. P. Darby, "
+        "Modelling a buffered impact damper system using a spring-damper model of impact, "
+        "Structural Control and Health Monitoring 16 (2009) 287-302, doi:10.1002/stc.238.</p>\n"
+        "</footer>\n</main>\n</body>\n</html>\n");
 }

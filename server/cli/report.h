@@ -26,7 +26,7 @@ typedef struct Report {
     ReportSection sections[REPORT_SECTIONS];
     size_t count;
     Warnings notes;
-    char *next; // what to do next, a command
+    char *next; // options of `impactd run SCENE` that continue from here
     bool is_failed;
 } Report;
 
@@ -34,7 +34,7 @@ typedef struct Report {
 void report_clear(Report *report);
 void report_title(Report *report, const char *title);
 void report_sentence(Report *report, const char *format, ...) __attribute__((format(printf, 2, 3)));
-// A command that continues from here.
+// The options of the run that continues from here.
 void report_next(Report *report, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void report_notes(Report *report, const Warnings *warnings);
 // A section, which the report owns; never NULL.

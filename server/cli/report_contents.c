@@ -369,31 +369,13 @@ void report_of_run(Report *report, const Simulation *simulation, const Outcome *
 
 // --- studies ---
 
-// "44 runs in 326 ms, none failed."
-static void study_add_count(Report *report, uint64_t count, const char *what, uint64_t failed,
-                            double seconds) {
-    char took[32], text[24];
-    snprintf(text, sizeof text, "%llu", (unsigned long long)failed);
-    report_sentence(report, "%llu %s in %s, %s failed.", (unsigned long long)count, what,
-                    report_seconds(took, seconds), failed > 0 ? text : "none");
-}
-
-static void study_add_runs(Report *report, const StudyRuns *made, double seconds) {
-    study_add_count(report, made->runs, "runs", made->failed, seconds);
-    report_notes(report, &made->warnings);
-}
-
-static void tradeoff_report(Report *report, const Variant *answer, double seconds) {
+static void tradeoff_report(Report *report, const Variant *answer) {
     const Tradeoff *tradeoff = (const Tradeoff *)(const void *)answer;
-    char took[32];
-    report_sentence(report, "%zu settings against the solver %s, in %s.", tradeoff->points.count,
-                    tradeoff->reference.solver, report_seconds(took, seconds));
     report_sentence(report, "Recommended: %s.", tradeoff->recommendation.why);
 }
 
-static void ensemble_report(Report *report, const Variant *answer, double seconds) {
+static void ensemble_report(Report *report, const Variant *answer) {
     const Ensemble *ensemble = (const Ensemble *)(const void *)answer;
-    study_add_runs(report, &ensemble->made, seconds);
     if (ensemble->target.why != NULL)
         report_sentence(report, "Target: %s.", ensemble->target.why);
     if (ensemble->trust.beyond > 0)
@@ -432,7 +414,7 @@ static void sweep_add_end(PrintTable *table, const Sweep *sweep, size_t metric, 
         print_table_add(table, "%s", "");
 }
 
-static void sweep_report(Report *report, const Variant *answer, double seconds) {
+static void sweep_report(Report *report, const Variant *answer) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
     const bool is_narrow = sweep->axes.count == 1; // a table has room for both ends
     char text[600] = "", axis[300], first[200], last[200];
@@ -444,7 +426,6 @@ static void sweep_report(Report *report, const Variant *answer, double seconds) 
                  of->unit != NULL ? " " : "", of->unit != NULL ? of->unit : "", of->values.count);
         text_list(text, sizeof text, axis);
     }
-    study_add_count(report, sweep->points, "points", sweep->table.failed, seconds);
     report_sentence(report, "%s.", text);
     for (int t = 0; t < (is_narrow ? 1 : 2); t++) {
         PrintTable *table = report_table(report, NULL,
@@ -465,8 +446,6 @@ static void sweep_report(Report *report, const Variant *answer, double seconds) 
 static void sweep_finish(ReportSection *section, const Variant *answer) {
     const Sweep *sweep = (const Sweep *)(const void *)answer;
     const bool is_map = sweep->axes.count > 1 && sweep->mode == SWEEP_GRID;
-    section->panels = is_map ? 1 : 2;
-    section->height = is_map ? 10 : 7;
     for (size_t i = 0; i < section->chart->count; i++) {
         ChartPanel *panel = &section->chart->panels[i];
         const ChartSeries line = panel->series[0];
@@ -484,13 +463,10 @@ static void sweep_finish(ReportSection *section, const Variant *answer) {
     }
 }
 
-static void compare_report(Report *report, const Variant *answer, double seconds) {
+static void compare_report(Report *report, const Variant *answer) {
     const Comparison *comparison = (const Comparison *)(const void *)answer;
-    char took[32];
-    report_sentence(report,
-                    "%zu contact models and separation rules, in %s; the first is the "
-                    "scene as it is, and PSD is the distance of spectra from its own.",
-                    comparison->entries.count, report_seconds(took, seconds));
+    report_sentence(report, "The first is the scene as it is; PSD is the distance of spectra from "
+                            "its own.");
     for (const CompareEntry *entry = comparison->entries.at;
          entry < comparison->entries.at + comparison->entries.count; entry++)
         if (entry->why != NULL &&
@@ -498,14 +474,10 @@ static void compare_report(Report *report, const Variant *answer, double seconds
             report->is_failed = true;
 }
 
-static void sensitivity_report(Report *report, const Variant *answer, double seconds) {
+static void sensitivity_report(Report *report, const Variant *answer) {
     const Sensitivity *sensitivity = (const Sensitivity *)(const void *)answer;
-    char took[32];
-    report_sentence(report,
-                    "%zu parameters, %llu drawn runs, in %s. A slope of 0.5 is a change of 0.5 %% "
-                    "for 1 %% of the parameter; \"-\" is a slope that does not settle.",
-                    sensitivity->response.count, (unsigned long long)sensitivity->made,
-                    report_seconds(took, seconds));
+    report_sentence(report, "A slope of 0.5 is a change of 0.5 %% for 1 %% of the parameter; \"-\" "
+                            "is a slope that does not settle.");
     if (sensitivity->why != NULL)
         report_sentence(report, "%s.", sensitivity->why);
     PrintTable *table = report_table(report, "Slopes of the response",
@@ -524,10 +496,9 @@ static void sensitivity_report(Report *report, const Variant *answer, double sec
     }
 }
 
-static void optimum_report(Report *report, const Variant *answer, double seconds) {
+static void optimum_report(Report *report, const Variant *answer) {
     const Optimum *optimum = (const Optimum *)(const void *)answer;
     const OptimumBest *best = &optimum->best;
-    study_add_runs(report, &optimum->made, seconds);
     for (size_t i = 0; i < best->objectives.count; i++) {
         const OptimumObjective *objective = &best->objectives.at[i];
         const double change =
@@ -544,6 +515,11 @@ static void optimum_report(Report *report, const Variant *answer, double seconds
     list_add(report, answer->kind->fields, answer,
              &(ReportList){"region", "Within 2 % of the best", "pointer=variable|low|high", "low",
                            false, 0});
+    for (size_t i = 0; i < best->values.count; i++) {
+        char one[200];
+        report_next(report, "%s --set %s=%s", i > 0 ? report->next : "--set study=null",
+                    best->values.at[i].member.pointer, scalar_text(one, best->values.at[i].value));
+    }
     PrintTable *table =
         report_table(report, "Gain", "quantity|best|as given|change [%]|without dampers");
     for (int m = 0; m < STUDY_METRIC_COUNT; m++) {
@@ -559,21 +535,19 @@ static void optimum_report(Report *report, const Variant *answer, double seconds
     }
 }
 
-static void calibration_report(Report *report, const Variant *answer, double seconds) {
+static void calibration_report(Report *report, const Variant *answer) {
     const Calibration *calibration = (const Calibration *)(const void *)answer;
-    study_add_runs(report, &calibration->made, seconds);
     report_sentence(report, "Verdict: %s.", calibrate_verdict_names[calibration->verdict]);
     if (calibration->detail != NULL)
         report_sentence(report, "%s.", calibration->detail);
 }
 
-static void response_report(Report *report, const Variant *answer, double seconds) {
+static void response_report(Report *report, const Variant *answer) {
     const ResponseCurve *curve = (const ResponseCurve *)(const void *)answer;
     const char *unit = curve->unit != NULL ? curve->unit : "";
     const ResponsePoint *peak = curve->points.at, *bare = peak;
     size_t stable = 0, unstable = 0, aperiodic = 0, chaotic = 0;
     Bytes text = {0};
-    study_add_runs(report, &curve->made, seconds);
     for (const ResponsePoint *at = peak; at < curve->points.at + curve->points.count; at++) {
         stable += at->stable == 1;
         unstable += at->stable == 0;
@@ -597,19 +571,11 @@ static void response_report(Report *report, const Variant *answer, double second
     report_fact(table, "no period found", &text);
 }
 
-static void fragility_report(Report *report, const Variant *answer, double seconds) {
-    const Fragility *fragility = (const Fragility *)(const void *)answer;
-    study_add_runs(report, &fragility->made, seconds);
-    report_sentence(report,
-                    "%zu ground motions; the median is the intensity at which half of them "
-                    "exceed the limit.",
-                    fragility->curves.count);
-}
-
-// A kind of study: its own sentences and tables, lists, the chart, further lists.
+// A kind of study: what is counted, its own sentences and tables, lists, the chart, further lists.
 typedef struct StudyReport {
     const StudyKind *kind;
-    void (*begin)(Report *report, const Variant *answer, double seconds);
+    const char *counted, *noun; // a member of the answer, and what it counts: "runs"
+    void (*begin)(Report *report, const Variant *answer);          // NULL: nothing
     ReportList before[LISTS_MAX], after[LISTS_MAX];                // before and after the chart
     const char *heading;                                           // of the chart
     size_t panels, height;                                         // as in a section
@@ -621,37 +587,37 @@ typedef struct StudyReport {
 
 // clang-format off
 static const StudyReport all[] = {
-    {&study_tradeoff, tradeoff_report,
+    {&study_tradeoff, "points", "settings", tradeoff_report,
      {{"points", "Settings that no other one beats", "name=setting|cpu_minimum=CPU [s]|steps|errors.displacement|errors.psd", "is_best", false, 0}},
      {{"points", "All settings", "name=setting|status|cpu_minimum=CPU [s]|steps|errors.displacement|errors.mean_acceleration|errors.peak_force|errors.impacts|errors.psd|why", NULL, true, 0}},
      "Error against CPU time", 1, 12, NULL},
-    {&study_ensemble, ensemble_report,
+    {&study_ensemble, "runs", "runs", ensemble_report,
      {{"statistics", NULL, "|" STATISTICS_COLUMNS, "mean", false, 0}},
      {{"statistics", "Quantiles over the runs", "|" QUANTILE_COLUMNS, "mean", true, 0},
       {"indices", "Sobol indices: parts of the variance", "metric|pointer=input|first=alone|total=in all|total_interval_95=95 %", "total", false, 6}},
      "Spectra and spread", 1, 10, NULL},
-    {&study_sweep, sweep_report, {{0}}, {{0}}, "Metrics over the axes", 2, 7, sweep_finish},
-    {&study_compare, compare_report,
+    {&study_sweep, "points", "points", sweep_report, {{0}}, {{0}}, "Metrics over the axes", 1, 10, sweep_finish},
+    {&study_compare, "entries", "contact models and separation rules", compare_report,
      {{"entries", NULL, "contact_model=model|separation|summary.rms_displacement=rms x [m]|summary.impacts|summary.peak_contact_force=force [N]|psd.level=PSD [dB]", NULL, false, 0}},
-     {{"entries", "Motions", "name=model|summary.peak_displacement|displacement.relative|displacement.correlation|divergence.time=apart at [s]|divergence.why", NULL, true, 0}},
+     {{"entries", "Motions", "name=model|summary.peak_displacement|displacement.relative|displacement.correlation|divergence.time=apart at [s]|divergence.is_trusted=trusted", NULL, true, 0}},
      "Spectra and motions", 1, 10, NULL},
-    {&study_response, response_report, {{0}},
+    {&study_response, "runs", "points", response_report, {{0}},
      {{"points", "Points", "value|direction|period|impacts_per_period|stable|peak_displacement|undamped_peak_displacement|lyapunov", NULL, true, 0}},
      "Curve", 1, 14, NULL},
-    {&study_sensitivity, sensitivity_report,
+    {&study_sensitivity, "made", "drawn runs", sensitivity_report,
      {{"contact", "Contact parameters", "damper|side|stiffness=k_b [N/m]|stiffness_by_restitution=by e|stiffness_by_contact_time=by T_c|damping=c_b [N s/m]|damping_by_restitution=by e|damping_by_contact_time=by T_c", "stiffness", false, 6},
       {"statistics", "Statistics over the drawn runs", "metric=quantity|" STATISTICS_COLUMNS, "mean", false, 0}},
      {{"statistics", "Quantiles over the drawn runs", "metric=quantity|" QUANTILE_COLUMNS, "mean", true, 0}},
      "Spectra and slopes", 1, 8, NULL},
-    {&study_fragility, fragility_report,
+    {&study_fragility, "runs", "runs", NULL,
      {{"limits", NULL, "metric|value=limit|exceeded|median|median_interval_95=95 %|dispersion", NULL, false, 0}},
      {{"fractiles", "Fractiles over the ground motions", "metric|level|count|p16|p50|p84", NULL, true, 0}},
      "Fragility", 1, 12, NULL},
-    {&study_calibrate, calibration_report,
+    {&study_calibrate, "runs", "runs", calibration_report,
      {{"parameters", "Fitted values", "pointer=parameter|value|unit|interval_95=95 %|identifiable=determined", NULL, false, 0},
       {"residual_rms", "Residuals", "channel|unit|value=rms of difference|measured_rms=rms measured|deviation=noise", NULL, false, 0}},
      {{0}}, "Measured and fitted", 2, 6, NULL},
-    {&study_optimize, optimum_report,
+    {&study_optimize, "runs", "runs", optimum_report,
      {{0}},
      {{"rivals", "Nearly as good", "values|difference|interval_95=95 %", NULL, false, 3},
       {"front", "Best compromises", "values|objectives", NULL, false, 3}},
@@ -659,12 +625,40 @@ static const StudyReport all[] = {
 };
 // clang-format on
 
+// "44 runs in 326 ms, none failed." and the warnings of the runs.
+static void study_add_count(Report *report, const StudyReport *of, const Variant *answer,
+                            double seconds) {
+    const Field *fields = answer->kind->fields;
+    const char *at[3] = {(const char *)answer, (const char *)answer, (const char *)answer};
+    const Field *counted = member_find(fields, of->counted, &at[0]);
+    const Field *failed = member_find(fields, "failed", &at[1]);
+    const Field *warnings = member_find(fields, "warnings", &at[2]);
+    const void *count = at[0] + counted->offset;
+    const bool is_list = counted->kind == FIELD_KIND_LIST;
+    char took[32], lost[40] = "";
+    const uint64_t losses =
+        failed != NULL ? *(const uint64_t *)(const void *)(at[1] + failed->offset) : 0;
+    if (losses > 0)
+        snprintf(lost, sizeof lost, ", %llu failed", (unsigned long long)losses);
+    report_sentence(report, "%llu %s in %s%s.",
+                    is_list ? (unsigned long long)((const List *)count)->count
+                            : (unsigned long long)*(const uint64_t *)count,
+                    of->noun, report_seconds(took, seconds),
+                    losses > 0       ? lost
+                    : failed != NULL ? ", none failed"
+                                     : "");
+    if (warnings != NULL)
+        report_notes(report, (const void *)(at[2] + warnings->offset));
+}
+
 void report_of_study(Report *report, const Variant *answer, double seconds) {
     size_t k = 0;
     while (all[k].kind->answer != answer->kind)
         k++;
     const StudyReport *of = &all[k];
-    of->begin(report, answer, seconds);
+    study_add_count(report, of, answer, seconds);
+    if (of->begin != NULL)
+        of->begin(report, answer);
     for (const ReportList *list = of->before; list->list != NULL; list++)
         list_add(report, answer->kind->fields, answer, list);
     Chart *chart = report_chart(report, of->heading, of->panels, of->height);

@@ -190,7 +190,9 @@ static void finding_print(const Finding *finding, const char *name, const Termin
                           const Texts *files) {
     Report report = {.is_page = false};
     finding_report(finding, &report);
-    if (report.next == NULL && files->count == 0)
+    if (report.next != NULL)
+        report_next(&report, "impactd run %s %s", finding->path, report.next);
+    else if (files->count == 0)
         report_next(&report, "impactd %s %s -o report.html", name, finding->path);
     report_print(&report, terminal, files);
     report_clear(&report);

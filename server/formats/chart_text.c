@@ -8,7 +8,7 @@
 #include "core/base/status.h"
 #include "server/formats/chart.h"
 
-enum { GLYPHS_MAX = 40, SHADES = 4 };
+enum { GLYPHS_MAX = 24, SHADES = 4 };
 
 // Of the palette of chart.c in the terminal's 256 colours: legible on light and on dark ground.
 static const unsigned char text_colours[CHART_COLOURS] = {32,  166, 35, 133, 136, 244,

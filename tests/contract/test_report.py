@@ -89,7 +89,7 @@ def studies():
         {**clearance, "count": 5}, {"pointer": "/dampers/0/buffer", "values": ["sponge", "aluminium"]}]}}, [
         "10 points", "0.01, aluminium@1"]
     yield "ensemble", {**program.scene("paper_random_sponge"), "duration": 3, "study": {"kind": "ensemble", "runs": 8}}, [
-        "8 runs in", "none failed", "mean", "95 % from", "peak contact force", "frequency [Hz]"]
+        "8 runs in", "mean", "95 % from", "peak contact force", "frequency [Hz]"]
     yield "optimize", {**free, "study": {"kind": "optimize", "variables": [clearance], "max_candidates": 30, "objectives": [
         {"metric": "rms_displacement"}]}}, [
         "Best rms_displacement of 30 candidates: ", "than as given", "/dampers/0/clearance", "Gain", "candidate"]

@@ -78,7 +78,7 @@ def on_terminal(*arguments, scene=None, columns=80, **environment):
                     written += piece
             os.close(end)
     text = written.decode().replace("\r\n", "\n")
-    return process.returncode, re.sub(r"^.*\r(?:\033\[K|(?=[^\r\n]))", "", text, flags=re.M)
+    return process.returncode, re.sub(r"^.*\r", "", text, flags=re.M)
 
 
 def scene(name):
