@@ -47,8 +47,7 @@ static struct {
     const char *folder, *parts, *target;
     GuidePage *pages[GUIDE_PAGES];
     size_t page_count;
-    size_t faults, missing;
-    Bytes order; // pages.txt
+    size_t faults;
 } guide;
 
 __attribute__((format(printf, 2, 3))) static void guide_fault(const GuidePage *page,
@@ -135,12 +134,6 @@ static const GuideHeading *heading_find(const GuidePage *page, const char *slug)
 // --- the order of the pages ---
 
 static void pages_add(const char *name, const char *group) {
-    char path[GUIDE_PATH];
-    snprintf(path, sizeof path, "%s/%s.md", guide.folder, name);
-    if (access(path, R_OK) != 0) {
-        guide.missing++;
-        return;
-    }
     GuidePage *page = page_find(name) == NULL ? calloc(1, sizeof *page) : NULL;
     if (page == NULL || guide.page_count == GUIDE_PAGES) {
         guide_fault(page, "%s: twice in pages.txt, or too many pages", name);
@@ -152,18 +145,12 @@ static void pages_add(const char *name, const char *group) {
     guide.pages[guide.page_count++] = page;
 }
 
-// Whether a page is in the order, written or not.
-static bool pages_have_planned(const char *name) {
-    char line[GUIDE_NAME + 2];
-    snprintf(line, sizeof line, "\n%s\n", name);
-    return strstr(bytes_string(&guide.order), line) != NULL;
-}
-
 static void pages_read_order(void) {
+    static Bytes text;
     char group[GUIDE_NAME] = "";
-    if (!guide_read(guide.folder, "pages", ".txt", &guide.order))
+    if (!guide_read(guide.folder, "pages", ".txt", &text))
         guide_fault(NULL, "pages.txt cannot be read");
-    for (const char *line = bytes_string(&guide.order); *line != '\0';) {
+    for (const char *line = bytes_string(&text); *line != '\0';) {
         const size_t length = strcspn(line, "\n");
         char name[GUIDE_NAME];
         snprintf(name, sizeof name, "%.*s", (int)length, line);
@@ -413,10 +400,8 @@ static void page_check_links(const GuidePage *page) {
     for (size_t i = 0; i < page->link_count; i++) {
         const GuideLink *link = &page->links[i];
         const GuidePage *target = page_find(link->page);
-        if (target == NULL && !pages_have_planned(link->page))
+        if (target == NULL)
             guide_fault(page, "links to %s.md, which is not in pages.txt", link->page);
-        else if (target == NULL)
-            guide.missing++;
         else if (link->anchor[0] != '\0' && heading_find(target, link->anchor) == NULL)
             guide_fault(page, "%s.md has no heading with the anchor #%s", link->page, link->anchor);
     }
@@ -546,7 +531,5 @@ int main(int argc, char **argv) {
         page_write(guide.pages[i], bytes_string(&frame));
     if (guide.faults == 0)
         search_write();
-    if (guide.missing > 0)
-        fprintf(stderr, "%s: %zu pages and links to them are missing\n", argv[1], guide.missing);
     return guide.faults > 0 ? 1 : 0;
 }

@@ -14,7 +14,6 @@ import tempfile
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 
-GUIDE = os.path.join(program.SOURCE, "web", "guide")
 BASE = "/impactd"
 
 
@@ -25,8 +24,7 @@ def read(*path):
 
 def pages():
     """The pages in their order."""
-    names = [line for line in read("web", "guide", "pages.txt").splitlines() if line and not line.startswith("#")]
-    return [name for name in names if os.path.exists(os.path.join(GUIDE, name + ".md"))]
+    return [line for line in read("web", "guide", "pages.txt").splitlines() if line and not line.startswith("#")]
 
 
 def anchors(text):
@@ -70,16 +68,10 @@ def test_every_link_and_anchor_of_every_page_leads_somewhere():
                 path = posixpath.normpath(posixpath.join(f"{BASE}/guide/", target)) + ("/" if target in ("./", "../") else "")
                 if target and path not in asked:
                     asked[path] = daemon.get(path).status
-                assert not target or asked[path] == 200 or is_planned(path), (name, link)
+                assert not target or asked[path] == 200, (name, link)
                 other = page if not target else served.get("index" if target == "./" else target.removesuffix(".html"))
                 assert not anchor or anchor.startswith("/") or other is None or anchor in other.ids, (name, link)
         assert len(asked) > len(served), asked
-
-
-def is_planned(path):
-    """A page of the order that is not written yet."""
-    name = posixpath.basename(path).removesuffix(".html")
-    return name in read("web", "guide", "pages.txt").split() and name not in pages()
 
 
 def test_pages_are_served_as_the_dashboard_is():
@@ -123,7 +115,7 @@ def test_every_question_mark_of_the_dashboard_leads_to_a_section():
     with program.daemon() as daemon:
         served = {name: Page(daemon.get(f"/guide/{name}.html").body.decode()).ids for name in pages()}
     for name, anchor in places:
-        assert is_planned(name) or name in served and (not anchor or anchor in served[name]), (name, anchor)
+        assert name in served and (not anchor or anchor in served[name]), (name, anchor)
     assert '<a href="guide/">Guide</a>' in read("web", "index.html")
 
 
@@ -136,9 +128,8 @@ def test_links_of_readme_lead_somewhere():
                 continue
             path, _, anchor = link.partition("#")
             path = posixpath.normpath(posixpath.join(posixpath.dirname(source), path)) if path else source
-            exists = os.path.exists(os.path.join(program.SOURCE, path))
-            assert exists or is_planned(path.removesuffix(".md")), (source, link)
-            assert not exists or not anchor or anchor in anchors(read(path)), (source, link)
+            assert os.path.exists(os.path.join(program.SOURCE, path)), (source, link)
+            assert not anchor or anchor in anchors(read(path)), (source, link)
 
 
 def test_the_search_index_has_every_heading():
@@ -210,7 +201,7 @@ def test_faults_of_pages_fail_the_build():
             (more("index.md", "\n#### Deep\n"), "level 4"), (more("index.md", "\n# Again\n"), "level 1"),
             (more("index.md", "\n> ## Inner\n"), "within another"), (more("index.md", "\n<b>x</b>\n"), "HTML"),
             (more("index.md", "\n<!-- generated: none -->\n"), 'no generated part "none"'), (more("index.md", "\n![x](b.svg)\n"), "b.svg"),
-            (more("index.md", "\n![](a.svg)\n"), "no description"), (more("pages.txt", "other\n"), "twice"), (more("guide.html", "{{none}}"), "{{none}}"),
+            (more("index.md", "\n![](a.svg)\n"), "no description"), (more("pages.txt", "third\n"), "third"), (more("pages.txt", "other\n"), "twice"), (more("guide.html", "{{none}}"), "{{none}}"),
             (lambda files: {"third.md": files["index.md"]}, "third.md is not in pages.txt"),
             (lambda files: {"index.md": "Text.\n"}, "does not begin"), (lambda files: {"index.md": "# Title\n\n## Next\n"}, "does not begin")):
         messages = render(change)
