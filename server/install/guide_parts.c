@@ -105,22 +105,35 @@ static void markdown_option(FILE *file, const Field *row) {
     fputs(" |\n", file);
 }
 
+// Tables of the options, one below each heading.
+static void markdown_options(FILE *file, const Command *command) {
+    const OptionGroup *group = command->groups;
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
+        const bool is_first =
+            group != NULL && group->first != NULL && strcmp(group->first, row->name) == 0;
+        if (is_first)
+            fprintf(file, "\n**%s**\n", group++->title);
+        if (is_first || row == command->options)
+            fputs("\n| option | meaning |\n|---|---|\n", file);
+        markdown_option(file, row);
+    }
+    fputc('\n', file);
+}
+
 void part_commands(FILE *file) {
+    const OptionGroup *group = command_groups;
     for (size_t i = 0; commands[i] != NULL; i++) {
         const Command *command = commands[i];
-        fprintf(file, "## impactd %s\n\n", command->name);
+        if (group->first != NULL && strcmp(group->first, command->name) == 0)
+            fprintf(file, "## %s\n\n", group++->title);
+        fprintf(file, "### impactd %s\n\n", command->name);
         markdown_sentence(file, command->summary);
-        fprintf(file, "```text\nimpactd %s%s%s%s\n```\n\n", command->name,
+        fprintf(file, "```\nimpactd %s%s%s%s\n```\n\n", command->name,
                 command->options != NULL ? " [OPTION]..." : "",
                 command->operands != NULL ? " " : "",
                 command->operands != NULL ? command->operands : "");
         markdown_help(file, command->help);
-        if (command->options == NULL || command->options->kind == FIELD_KIND_END)
-            continue;
-        fputs("| option | meaning |\n|---|---|\n", file);
-        for (const Field *row = command->options; row->kind != FIELD_KIND_END; row++)
-            markdown_option(file, row);
-        fputc('\n', file);
+        markdown_options(file, command);
     }
 }
 
