@@ -2,16 +2,13 @@
 import assert from "node:assert/strict";
 import { axe, overflow, says, test } from "./support.mjs";
 
-// Leaves only blocks of a shape that no page before had: all pages have one style, and axe-core takes a second for a long one.
-// The shapes of all pages so far.
+// Leaves only blocks with an element in a parent that no page before had: all pages have one style, and axe-core takes a second
+// for a long one. Returns these shapes of all pages so far.
 const trim = (page, known) => page.evaluate((known) => {
   const seen = new Set(known);
   for (const block of document.querySelectorAll("main > *, nav li, main tr")) {
-    const shapes = [block, ...block.querySelectorAll("*")].map((node) => {
-      let shape = "";
-      for (let at = node; at !== block.parentElement; at = at.parentElement) shape = `${at.localName}.${at.className} ${shape}`;
-      return shape;
-    });
+    const shapes = [block, ...block.querySelectorAll("*")].map((node) =>
+      [node.parentElement, node].map(({ localName, className }) => `${localName}.${className}`).join(" "));
     if (shapes.every((shape) => seen.has(shape)) && !block.matches("h1")) block.remove();
     shapes.forEach((shape) => seen.add(shape));
   }
