@@ -260,7 +260,7 @@ function text = request(server, method, path, body, headers, file)
         setenv('IMPACTD_CLIENT_HEADER', ['Authorization: Bearer ' server.token]);
         command = ['printf ''header = "%s"\n'' "$IMPACTD_CLIENT_HEADER" | ' command ' -K -'];
     end
-    [code, out] = system(command);
+    [code, out] = system([command ' 2>&1']);
     if code ~= 0
         error('impactd:connection', 'no answer from %s: %s', server.url, strtrim(regexprep(out, '\d+$', '')));
     end

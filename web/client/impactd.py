@@ -140,7 +140,10 @@ def _plain(value: Any) -> Any:
 
 
 def _encode(document: Any) -> bytes:
-    return json.dumps(document, default=_plain, allow_nan=False).encode()
+    try:
+        return json.dumps(document, default=_plain, allow_nan=False).encode()
+    except ValueError as error:
+        raise ValueError("NaN and infinity cannot be sent; None is an absent value") from error
 
 
 def _steps(path: str) -> list[str]:
@@ -412,8 +415,8 @@ class _Progress:
         if done < self.total and now - self.shown < 0.1:
             return
         self.shown = now
-        sys.stderr.write(f"\r{done} of {self.total} {self.what}, {now - self.begin:.1f} s"
-                         + ("\n" if done >= self.total else ""))
+        count = f"{done} %" if self.what == "%" else f"{done} of {self.total} {self.what}"
+        sys.stderr.write(f"\r{count}, {now - self.begin:.1f} s" + ("\n" if done >= self.total else ""))
         sys.stderr.flush()
 
 
@@ -825,7 +828,7 @@ class Study(Result):
 
         Of an optimisation it is the best candidate: its values, its objectives, "feasible". Of a calibration the
         fitted values. Of any other study the row with the smallest `metric`, with goal="maximize" the largest; by
-        default a sweep's first metric.
+        default rms_displacement, or the first metric of a sweep without it.
         """
         if metric is None and self.kind in ("optimize", "calibrate"):
             return self._solution()
@@ -841,8 +844,8 @@ class Study(Result):
         return isinstance(row.get(name), (int, float)) and row[name] == row[name]
 
     def _metric(self) -> str:
-        study = self.document["scene"]["study"]
-        return (study.get("metrics") or [study.get("metric") or "rms_displacement"])[0]
+        rows, metrics = self._read()[0], self.document["scene"]["study"].get("metrics")
+        return metrics[0] if metrics and rows and "rms_displacement" not in rows[0] else "rms_displacement"
 
     def _solution(self) -> dict[str, Any]:
         if self.kind == "calibrate":
@@ -857,6 +860,14 @@ class Study(Result):
     @staticmethod
     def _values(axes: list[dict[str, Any]]) -> dict[str, Any]:
         return {_dotted(name): one["value"] for one in axes for name in one["pointers"] or [one["pointer"]]}
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = [("study", self.kind), ("rows of the table", str(len(self._read()[0])))]
+        if self.kind in ("sweep", "optimize", "calibrate") and not (self.kind == "optimize" and self.answer["best"] is None):
+            units = self.table_units
+            rows += [(f"best {name}", f"{value:.6g} {units.get(name, '')}" if isinstance(value, float) else str(value))
+                     for name, value in self.best().items() if self.kind != "sweep" or "." in name or name == self._metric()]
+        return rows
 
     def best_scene(self, metric: Optional[str] = None, goal: str = "minimize") -> dict[str, Any]:
         """The scene of `best()`, ready for `lab.run`. For sweeps, optimisations and calibrations."""
