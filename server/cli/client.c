@@ -1,5 +1,5 @@
-// Headers and bodies are counted as they arrive, nothing is unpacked, no redirect is followed (the
-// token would go with it), and only http and https are used.
+// Headers and bodies are counted as they arrive, nothing is unpacked, and only http and https are
+// used. The token would go with a redirect: none is followed but one of a GET on the same server.
 #include "server/cli/client.h"
 
 #include <assert.h>
@@ -238,9 +238,10 @@ typedef struct Transfer {
     ApiCall *call;
     const ApiRequest *request;
     Problem *problem;
-    Status status;          // not STATUS_OK: why the response was refused
-    size_t headers;         // [B] so far
-    uint64_t received;      // [B] of the body so far
+    Status status;     // not STATUS_OK: why the response was refused
+    size_t headers;    // [B] so far
+    uint64_t received; // [B] of the body so far
+    bool is_redirected;
     uint64_t continue_from; // [B] that an earlier response had; 0: this is the first
 } Transfer;
 
@@ -437,6 +438,19 @@ static Status transfer_run(Transfer *transfer, const char *url, CURLcode *code) 
     (void)curl_easy_getinfo(transfer->call->curl, CURLINFO_RESPONSE_CODE, &status);
     (void)curl_easy_getinfo(transfer->call->curl, CURLINFO_REDIRECT_URL, &location);
     answer->code = transfer->continue_from > 0 && status == 206 ? 200 : (int)status;
+    // A shortened id: the server gives the path with the whole one.
+    const size_t own = strlen(transfer->call->url);
+    if (status == 307 && !transfer->is_redirected && transfer->request->method == NULL &&
+        location != NULL && strncmp(location, transfer->call->url, own) == 0 &&
+        location[own] == '/') {
+        char *path = strdup(location);
+        transfer->is_redirected = true;
+        transfer->headers = 0;
+        bytes_clear(&answer->body);
+        const Status again = path != NULL ? transfer_run(transfer, path, code) : STATUS_NO_MEMORY;
+        free(path);
+        return again;
+    }
     if (status >= 300 && status < 400)
         return problem_set(transfer->problem, STATUS_UNREACHABLE,
                            "%s answers %ld and points to %.200s; redirects are not followed: give "
@@ -624,7 +638,7 @@ Status api_print_tables(ApiCall *call, Problem *problem) {
         TRY(print_table_print_json(&call->answer.body, view, terminal_table_form(), stdout, &rows,
                                    problem));
     if (rows == 0)
-        fprintf(stderr, "impactd %s: nothing fits\n", call->command->name);
+        fprintf(stderr, "impactd %s: none found\n", call->command->name);
     return STATUS_OK;
 }
 

@@ -1,6 +1,6 @@
 // The frame of the commands that ask a server: their actions and operands, requests, answers,
-// problem documents. The server is not trusted: its headers and bodies are bounded, redirects are
-// not followed, TLS is verified.
+// problem documents. The server is not trusted: its headers and bodies are bounded, redirects to
+// other servers are not followed, TLS is verified.
 #ifndef SERVER_CLI_CLIENT_H
 #define SERVER_CLI_CLIENT_H
 

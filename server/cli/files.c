@@ -46,8 +46,8 @@ int input_command(const Command *self, const char *what, const Options *options,
                                 Problem *problem),
                   Problem *problem) {
     if (options->operand_count != 1) {
-        (void)problem_set(problem, STATUS_USAGE, "takes one %s, is given %zu", what,
-                          options->operand_count);
+        (void)problem_set(problem, STATUS_USAGE, "takes one %s, is given %zu: impactd %s %s", what,
+                          options->operand_count, self->name, self->operands);
         return command_error(self->name, problem);
     }
     const char *path = options->operands[0];

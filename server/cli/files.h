@@ -33,10 +33,10 @@ typedef struct RecordFiles {
 // The rows of settings with both members.
 #define RECORD_ROWS(Type)                                                                          \
     FIELD_TEXTS(Type, record, NULL, NULL, RECORD_FILES, PRESENCE_OPTIONAL, 0,                      \
-                "ground motion that the scene names by the name of this file; may be given "       \
-                "again"),                                                                          \
+                "ground motion file, which the scene names without folder and extension; "         \
+                "repeatable"),                                                                     \
         FIELD_CHOICE(Type, unit, acceleration_unit_names, OPTIONAL,                                \
-                     "of these files: g, m/s^2 or cm/s^2; overrides the files")
+                     "unit of these files, in place of the one they state: g, m/s^2 or cm/s^2")
 Status record_files_add(struct Db *db, const RecordFiles *files, Problem *problem);
 // "csv" of "/data/out.csv"; NULL if there is none.
 const char *path_extension(const char *path);

@@ -292,7 +292,7 @@ static Status jobs_act(ApiCall *call, Problem *problem) {
         print_table_print(&table, &form, stdout);
     print_table_clear(&table);
     if (count == 0)
-        fputs("impactd jobs: there are none\n", stderr);
+        fputs("impactd jobs: none found\n", stderr);
     else if (call->answer.next[0] != '\0' || json_get_item(call->reply, "jobs", count) != NULL)
         fprintf(stderr, "impactd jobs: these are the newest %zu; --limit N or --all shows more\n",
                 count);
@@ -412,7 +412,7 @@ static const Field get_fields[] = {
     FIELD_TEXT(JobsSettings, channels, 4000, PRESENCE_OPTIONAL, 0, "channels of the series, separated by commas (all)"),
     FIELD_REAL(JobsSettings, from, "s", AT_MIN(0), OPTIONAL, "start of the series"),
     FIELD_REAL(JobsSettings, to, "s", AT_MIN(0), OPTIONAL, "end of the series, inclusive"),
-    FIELD_COUNT(JobsSettings, points, NULL, AT_MIN(1), OPTIONAL, "reduce the series to this number of buckets, each with its minimum and maximum"),
+    FIELD_COUNT(JobsSettings, points, NULL, AT_MIN(1), OPTIONAL, "reduce the series to this number of intervals, each with minimum and maximum"),
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 0, "how long to wait for an unfinished job and a busy server (0)"),
     FIELD_COUNT(JobsSettings, max_bytes, "B", AT_MIN(1), 17179869184.0, "refuse a larger answer"),
     FIELD_END,
@@ -443,9 +443,9 @@ static const Field submit_fields[] = {
     SET_ROW(JobsSettings),
     VARY_ROW(JobsSettings),
     FIELD_TEXT(JobsSettings, title, 0, PRESENCE_OPTIONAL, 0, "title of the job; replaces that of the scene"),
-    FIELD_TEXTS(JobsSettings, label, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "KEY=VALUE, added to the labels of the scene; repeatable"),
+    FIELD_TEXTS(JobsSettings, label, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "add this to the labels of the scene; repeatable"),
     FIELD_FLAG(JobsSettings, dry_run, false, "print the plan and the estimated cost as JSON; run nothing"),
-    FIELD_TEXT(JobsSettings, idempotency_key, 255, PRESENCE_OPTIONAL, 0, "a scene that is sent again with this key is the same job"),
+    FIELD_TEXT(JobsSettings, idempotency_key, 255, PRESENCE_OPTIONAL, 0, "a scene that is sent twice with this key is one job"),
     FIELD_FLAG(ClientSettings, json, false, "print the job as JSON instead of its id"),
     FIELD_END,
 };

@@ -108,7 +108,7 @@ static const Field records_fields[] = {
     CLIENT_ROWS,
     FIELD_TEXT(RecordsSettings, name, RECORD_NAME_SIZE - 1, PRESENCE_OPTIONAL, 0, "add: name for scenes (name of the file without its extension)"),
     FIELD_REAL(RecordsSettings, interval, "s", ABOVE(0), OPTIONAL, "add: time between samples, if the file does not state it"),
-    FIELD_CHOICE(RecordsSettings, unit, acceleration_unit_names, OPTIONAL, "add: g, m/s^2 or cm/s^2; overrides the file"),
+    FIELD_CHOICE(RecordsSettings, unit, acceleration_unit_names, OPTIONAL, "add: unit, in place of the one the file states: g, m/s^2 or cm/s^2"),
     FIELD_TEXT(RecordsSettings, source, 1000, PRESENCE_OPTIONAL, 0, "add: origin of the file"),
     FIELD_TEXT(RecordsSettings, processing, 1000, PRESENCE_OPTIONAL, 0, "add: processing, such as filters and baseline correction"),
     FIELD_TEXT(RecordsSettings, earthquake, 200, PRESENCE_OPTIONAL, 0, "add: earthquake"),
@@ -252,7 +252,7 @@ static const PrintTableView records_view = {
 // clang-format off
 static const Field import_fields[] = {
     FIELD_REAL(ImportSettings, interval, "s", ABOVE(0), OPTIONAL, "time between samples, if the file does not state it"),
-    FIELD_CHOICE(ImportSettings, unit, acceleration_unit_names, OPTIONAL, "g, m/s^2 or cm/s^2; overrides the file"),
+    FIELD_CHOICE(ImportSettings, unit, acceleration_unit_names, OPTIONAL, "unit, in place of the one the file states: g, m/s^2 or cm/s^2"),
     FIELD_REAL(ImportSettings, scale, NULL, ANY, 1, "factor on the samples"),
     FIELD_TEXT(ImportSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file"),
     FIELD_END,

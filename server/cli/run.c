@@ -71,7 +71,8 @@ typedef struct RunSettings {
 
 static const Field run_fields[] = {
     FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
-               "write to this file; its extension says what"),
+               "write to this file; the extension is the format: .json, .csv, .npy, .npz, .mat, "
+               ".svg, .html"),
     FIELD_FLAG(RunSettings, json, false, "print the finished job as JSON, also on a terminal"),
     SET_ROW(RunSettings),
     VARY_ROW(RunSettings),
@@ -428,12 +429,11 @@ typedef struct StudyCommand {
 
 #define OUTPUT_ROW(formats)                                                                        \
     FIELD_TEXTS(StudySettings, output, NULL, NULL, OUTPUTS_MAX, PRESENCE_OPTIONAL, 0,              \
-                "write to this file, " formats "; may be given again")
+                "write to this file: " formats " or .html, a page; repeatable")
 #define STUDY_CPU_ROW                                                                              \
     FIELD_REAL(StudySettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), OPTIONAL,                   \
                "refuse a study that is predicted to need more CPU time in all (60 for each run)")
-#define JSON_ROW                                                                                   \
-    FIELD_FLAG(StudySettings, json, false, "print the document, as the server sends it")
+#define JSON_ROW FIELD_FLAG(StudySettings, json, false, "print the complete result as JSON")
 
 // The format of a path's extension; NULL if the study has none such.
 static const TableFormat *study_format(const StudyKind *kind, const char *path) {
@@ -572,7 +572,7 @@ static int study_command_run(const Command *self, void *of, const Options *optio
 
 // Of the studies whose request is all in the scene.
 static const Field study_fields[] = {
-    OUTPUT_ROW(".json the whole, .csv or .npz the table or .svg the chart"),
+    OUTPUT_ROW(".json, complete; .csv or .npz, a table; .svg, a chart;"),
     JSON_ROW,
     SET_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
@@ -595,17 +595,18 @@ const Command command_study = {
 
 // Ranges and defaults are the study's own.
 static const Field tradeoff_fields[] = {
-    OUTPUT_ROW(".json the table or .svg the chart"),
+    OUTPUT_ROW(".json, a table; .svg, a chart;"),
     JSON_ROW,
     FIELD_REAL(StudySettings, error, NULL, ANY, OPTIONAL,
-               "error wanted, in the metric's unit (1e-3)"),
+               "largest acceptable error, in the unit of the metric (1e-3)"),
     FIELD_CHOICE(StudySettings, metric, metric_names, OPTIONAL,
                  "displacement, mean_acceleration, peak_force, impacts, psd or rms_displacement"),
-    FIELD_COUNT(StudySettings, repeats, NULL, AT_MIN(0), OPTIONAL, "timings of each point (5)"),
+    FIELD_COUNT(StudySettings, repeats, NULL, AT_MIN(0), OPTIONAL,
+                "number of timings of each point (5)"),
     FIELD_TEXTS(StudySettings, solver, NULL, NULL, SOLVERS_MAX, PRESENCE_OPTIONAL, 0,
-                "try this solver only; may be given again"),
+                "compare only this solver; repeatable"),
     FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL,
-               "solver steps a point may be predicted to take (5e7)"),
+               "skip points that are predicted to need more solver steps (5e7)"),
     SET_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
     STUDY_CPU_ROW,
@@ -651,17 +652,17 @@ const Command command_tradeoff = {
 
 // Ranges and defaults are the study's own.
 static const Field ensemble_fields[] = {
-    OUTPUT_ROW(".json the whole, .csv or .npz the runs or .svg the chart"),
+    OUTPUT_ROW(".json, complete; .csv or .npz, all runs; .svg, a chart;"),
     JSON_ROW,
     FIELD_COUNT(StudySettings, runs, NULL, AT_MIN(0), OPTIONAL,
-                "runs, under a target at most so many (64)"),
+                "number of runs; with --target the largest number (64)"),
     FIELD_COUNT(StudySettings, first_seed, NULL, AT_MIN(0), OPTIONAL,
-                "seed of the first (the scene's own)"),
+                "seed of the first run (that of the scene)"),
     FIELD_REAL(StudySettings, target, NULL, ANY, OPTIONAL,
-               "relative error wanted of the metric's mean: no more runs than keep it"),
+               "stop when the mean of the metric is known to this relative error"),
     FIELD_CHOICE(
         StudySettings, metric, statistics_metric_names, OPTIONAL,
-        "peak_displacement, rms_displacement (usual), peak_acceleration, "
+        "peak_displacement, rms_displacement (default), peak_acceleration, "
         "rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear "
         "or psd"),
     SET_ROW(StudySettings),
@@ -701,7 +702,7 @@ const Command command_ensemble = {
 };
 
 static const Field sweep_fields[] = {
-    OUTPUT_ROW(".json, .csv, .npy, .npz or .mat the table or .svg the chart"),
+    OUTPUT_ROW(".json, .csv, .npy, .npz or .mat, a table; .svg, a chart;"),
     JSON_ROW,
     SET_ROW(StudySettings),
     VARY_ROW(StudySettings),

@@ -56,6 +56,9 @@ def test_jobs_lists_and_open_names_the_page():
             code, out, _ = client(daemon.url, "jobs", *options)
             assert code == 0 and len(re.findall(r'^j-|"id": "j-', out, re.M)) == count, (options, out)
         assert client(daemon.url, "jobs", "--status", "done")[0] == 2
+        for arguments in (("watch", ids[0][:-1]), ("get", ids[0][:-1], "job")):
+            code, out, errors = client(daemon.url, *arguments)
+            assert code == 0 and ids[0][:-1] in out and "successful" in out, (arguments, out, errors)
     pages = [say(body=json.dumps({"jobs": [{"id": f"j-{page}{i:02}", "status": "running", "progress": 5} for i in range(100)]}).encode(),
                  Link=f'</v1/jobs?before={page}>; rel="next"' if page < 2 else "") for page in range(3)]
     for options, count in ((("--limit", "150"), 150), (("--all",), 300), (("--limit", "100"), 100)):
