@@ -631,12 +631,15 @@ void api_print(const ApiCall *call) {
 
 Status api_print_tables(ApiCall *call, Problem *problem) {
     const PrintTableView *view = call->command->view;
+    const char *action = call->action->name;
+    PrintTableForm form = terminal_table_form();
     size_t rows = 1;
+    if (action == NULL || strcmp(action, "list") != 0)
+        form.width = 0; // only lists are cut
     if (view == NULL || ((const ClientSettings *)call->settings)->json)
         api_print(call);
     else
-        TRY(print_table_print_json(&call->answer.body, view, terminal_table_form(), stdout, &rows,
-                                   problem));
+        TRY(print_table_print_json(&call->answer.body, view, form, stdout, &rows, problem));
     if (rows == 0)
         fprintf(stderr, "impactd %s: none found\n", call->command->name);
     return STATUS_OK;

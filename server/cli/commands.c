@@ -14,14 +14,15 @@
 #include "server/options.h"
 #include "server/util/embedded.h"
 
-static int help_run(const Command *self, void *settings, const Options *options, Problem *problem);
-static int version_run(const Command *self, void *settings, const Options *options,
-                       Problem *problem);
-static int examples_run(const Command *self, void *settings, const Options *options,
-                        Problem *problem);
-static int cite_run(const Command *self, void *settings, const Options *options, Problem *problem);
-static int complete_run(const Command *self, void *settings, const Options *options,
-                        Problem *problem);
+enum { EXAMPLE_NAME = 64, EXAMPLES_MAX = 200 };
+
+// "paper_free_sponge" of "schema/examples/paper_free_sponge.json".
+static const char *example_name(const EmbeddedFile *file, char name[EXAMPLE_NAME]) {
+    const char *slash = strrchr(file->path, '/');
+    const char *from = slash != NULL ? slash + 1 : file->path;
+    snprintf(name, EXAMPLE_NAME, "%.*s", (int)strcspn(from, "."), from);
+    return name;
+}
 
 typedef struct ExamplesSettings {
     char *output;
@@ -32,6 +33,39 @@ static const Field examples_fields[] = {
                "write the example to this file (standard output)"),
     FIELD_END,
 };
+
+static int examples_run(const Command *self, void *of, const Options *options, Problem *problem) {
+    const char *wanted = options->operand_count > 0 ? options->operands[0] : NULL;
+    const char *names[EXAMPLES_MAX + 1] = {NULL};
+    char known[EXAMPLES_MAX][EXAMPLE_NAME];
+    PrintTable table = {.columns = 2, .has_heads = true};
+    const PrintTableForm form = terminal_table_form();
+    print_table_add(&table, "name");
+    print_table_add(&table, "title");
+    for (size_t i = 0; i < EXAMPLES_MAX && embedded_examples[i].path != NULL; i++) {
+        const EmbeddedFile *file = &embedded_examples[i];
+        StudyRequest scene;
+        names[i] = example_name(file, known[i]);
+        if (wanted != NULL && strcmp(names[i], wanted) == 0) {
+            const Bytes text = {.at = (char *)(uintptr_t)file->bytes, .count = file->size};
+            print_table_clear(&table);
+            return command_end(self, output_put(*(char **)of, &text, problem), problem);
+        }
+        (void)json_parse(file->bytes, file->size, study_request_fields, &scene, NULL);
+        print_table_add(&table, "%s", names[i]);
+        print_table_add(&table, "%s", scene.simulation.title);
+        study_request_clear(&scene);
+    }
+    if (wanted == NULL)
+        print_table_print(&table, &form, stdout);
+    print_table_clear(&table);
+    const char *near = wanted != NULL ? spelling_nearest(names, wanted) : NULL;
+    if (wanted != NULL)
+        (void)problem_set(problem, STATUS_NOT_FOUND, "there is no example \"%.60s\"%s%s%s", wanted,
+                          near != NULL ? " (did you mean " : "", near != NULL ? near : "",
+                          near != NULL ? "?)" : "");
+    return command_end(self, problem->status, problem);
+}
 
 static const Command command_examples = {
     .name = "examples",
@@ -45,6 +79,34 @@ static const Command command_examples = {
     .size = sizeof(ExamplesSettings),
     .run = examples_run,
 };
+
+static int cite_run(const Command *self, void *settings, const Options *options, Problem *problem) {
+    (void)self, (void)options, (void)problem;
+    if (!*(const bool *)settings)
+        printf("impactd %s (engine %s), simulation of structures with impact dampers.\n"
+               "\n"
+               "Its model: K. Li and A. P. Darby, Modelling a buffered impact damper system\n"
+               "using a spring-damper model of impact, Structural Control and Health\n"
+               "Monitoring 16 (2009) 287-302, doi:10.1002/stc.238.\n",
+               program_version, engine_version);
+    else
+        printf("@software{impactd,\n"
+               "  title   = {impactd: simulation of structures with impact dampers},\n"
+               "  version = {%s, engine %s}\n"
+               "}\n"
+               "@article{LiDarby2009,\n"
+               "  author  = {Li, Kuinian and Darby, Antony P.},\n"
+               "  title   = {Modelling a buffered impact damper system using a spring-damper\n"
+               "             model of impact},\n"
+               "  journal = {Structural Control and Health Monitoring},\n"
+               "  volume  = {16},\n"
+               "  pages   = {287--302},\n"
+               "  year    = {2009},\n"
+               "  doi     = {10.1002/stc.238}\n"
+               "}\n",
+               program_version, engine_version);
+    return COMMAND_OK;
+}
 
 static const Field cite_fields[] = {
     {.name = "bibtex", .kind = FIELD_KIND_FLAG, .doc = "print entries for BibTeX"},
@@ -61,6 +123,25 @@ static const Command command_cite = {
     .run = cite_run,
 };
 
+static int complete_run(const Command *self, void *settings, const Options *options,
+                        Problem *problem) {
+    static const struct {
+        const char *kind, *path, *list, *names[3];
+    } rows[] = {{"ids", "/v1/jobs?limit=100", "jobs", {"id", "result", NULL}},
+                {"materials", "/v1/materials?limit=1000", "materials", {"slug", NULL}},
+                {"records", "/v1/records?limit=500", "records", {"name", NULL}}};
+    const char *kind = options->operand_count > 0 ? options->operands[0] : "";
+    char name[EXAMPLE_NAME];
+    (void)problem;
+    for (size_t i = 0; i < COUNT(rows); i++)
+        if (strcmp(kind, rows[i].kind) == 0)
+            api_print_members(self, settings, rows[i].path, rows[i].list, rows[i].names);
+    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
+        if (strcmp(kind, "examples") == 0)
+            puts(example_name(file, name));
+    return COMMAND_OK;
+}
+
 // For the completion of shells; in no list.
 static const Command command_complete = {
     .name = "complete",
@@ -71,18 +152,28 @@ static const Command command_complete = {
     .run = complete_run,
 };
 
+static int version_run(const Command *self, void *settings, const Options *options,
+                       Problem *problem) {
+    (void)self, (void)settings, (void)options, (void)problem;
+    printf("impactd %s (engine %s)\n", program_version, engine_version);
+    return COMMAND_OK;
+}
+
+static const Command command_version = {
+    .name = "version",
+    .summary = "print the versions of program and engine",
+    .help = "  impactd version\n",
+    .run = version_run,
+};
+
+static int help_run(const Command *self, void *settings, const Options *options, Problem *problem);
+
 static const Command command_help = {
     .name = "help",
     .operands = "[COMMAND]",
     .summary = "show the help of a command",
     .help = "  impactd help run\n",
     .run = help_run,
-};
-static const Command command_version = {
-    .name = "version",
-    .summary = "print the versions of program and engine",
-    .help = "  impactd version\n",
-    .run = version_run,
 };
 
 const Command *const commands[] = {
@@ -138,16 +229,6 @@ const Command *command_find(const char *name) {
     return strcmp(name, command_complete.name) == 0 ? &command_complete : NULL;
 }
 
-enum { EXAMPLE_NAME = 64, EXAMPLES_MAX = 200 };
-
-// "paper_free_sponge" of "schema/examples/paper_free_sponge.json".
-static const char *example_name(const EmbeddedFile *file, char name[EXAMPLE_NAME]) {
-    const char *slash = strrchr(file->path, '/');
-    const char *from = slash != NULL ? slash + 1 : file->path;
-    snprintf(name, EXAMPLE_NAME, "%.*s", (int)strcspn(from, "."), from);
-    return name;
-}
-
 static void overview_print(FILE *file) {
     const OptionGroup *group = command_groups;
     fputs(overview, file);
@@ -192,93 +273,6 @@ static int help_run(const Command *self, void *settings, const Options *options,
     if (command == NULL)
         return unknown_refuse(options->operands[0]);
     command_print(command);
-    return COMMAND_OK;
-}
-
-static int version_run(const Command *self, void *settings, const Options *options,
-                       Problem *problem) {
-    (void)self, (void)settings, (void)options, (void)problem;
-    printf("impactd %s (engine %s)\n", program_version, engine_version);
-    return COMMAND_OK;
-}
-
-static int examples_run(const Command *self, void *of, const Options *options, Problem *problem) {
-    const char *wanted = options->operand_count > 0 ? options->operands[0] : NULL;
-    const char *names[EXAMPLES_MAX + 1] = {NULL};
-    char known[EXAMPLES_MAX][EXAMPLE_NAME];
-    PrintTable table = {.columns = 2, .has_heads = true};
-    const PrintTableForm form = terminal_table_form();
-    print_table_add(&table, "name");
-    print_table_add(&table, "title");
-    for (size_t i = 0; i < EXAMPLES_MAX && embedded_examples[i].path != NULL; i++) {
-        const EmbeddedFile *file = &embedded_examples[i];
-        StudyRequest scene;
-        names[i] = example_name(file, known[i]);
-        if (wanted != NULL && strcmp(names[i], wanted) == 0) {
-            const Bytes text = {.at = (char *)(uintptr_t)file->bytes, .count = file->size};
-            print_table_clear(&table);
-            return command_end(self, output_put(*(char **)of, &text, problem), problem);
-        }
-        (void)json_parse(file->bytes, file->size, study_request_fields, &scene, NULL);
-        print_table_add(&table, "%s", names[i]);
-        print_table_add(&table, "%s", scene.simulation.title);
-        study_request_clear(&scene);
-    }
-    if (wanted == NULL)
-        print_table_print(&table, &form, stdout);
-    print_table_clear(&table);
-    const char *near = wanted != NULL ? spelling_nearest(names, wanted) : NULL;
-    if (wanted != NULL)
-        (void)problem_set(problem, STATUS_NOT_FOUND, "there is no example \"%.60s\"%s%s%s", wanted,
-                          near != NULL ? " (did you mean " : "", near != NULL ? near : "",
-                          near != NULL ? "?)" : "");
-    return command_end(self, problem->status, problem);
-}
-
-static int cite_run(const Command *self, void *settings, const Options *options, Problem *problem) {
-    (void)self, (void)options, (void)problem;
-    if (!*(const bool *)settings)
-        printf("impactd %s (engine %s), simulation of structures with impact dampers.\n"
-               "\n"
-               "Its model: K. Li and A. P. Darby, Modelling a buffered impact damper system\n"
-               "using a spring-damper model of impact, Structural Control and Health\n"
-               "Monitoring 16 (2009) 287-302, doi:10.1002/stc.238.\n",
-               program_version, engine_version);
-    else
-        printf("@software{impactd,\n"
-               "  title   = {impactd: simulation of structures with impact dampers},\n"
-               "  version = {%s, engine %s}\n"
-               "}\n"
-               "@article{LiDarby2009,\n"
-               "  author  = {Li, Kuinian and Darby, Antony P.},\n"
-               "  title   = {Modelling a buffered impact damper system using a spring-damper\n"
-               "             model of impact},\n"
-               "  journal = {Structural Control and Health Monitoring},\n"
-               "  volume  = {16},\n"
-               "  pages   = {287--302},\n"
-               "  year    = {2009},\n"
-               "  doi     = {10.1002/stc.238}\n"
-               "}\n",
-               program_version, engine_version);
-    return COMMAND_OK;
-}
-
-static int complete_run(const Command *self, void *settings, const Options *options,
-                        Problem *problem) {
-    static const struct {
-        const char *kind, *path, *list, *names[3];
-    } rows[] = {{"ids", "/v1/jobs?limit=100", "jobs", {"id", "result", NULL}},
-                {"materials", "/v1/materials?limit=1000", "materials", {"slug", NULL}},
-                {"records", "/v1/records?limit=500", "records", {"name", NULL}}};
-    const char *kind = options->operand_count > 0 ? options->operands[0] : "";
-    char name[EXAMPLE_NAME];
-    (void)problem;
-    for (size_t i = 0; i < COUNT(rows); i++)
-        if (strcmp(kind, rows[i].kind) == 0)
-            api_print_members(self, settings, rows[i].path, rows[i].list, rows[i].names);
-    for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
-        if (strcmp(kind, "examples") == 0)
-            puts(example_name(file, name));
     return COMMAND_OK;
 }
 

@@ -351,7 +351,8 @@ static Status plan_print(const char *path, DryRun *run, const Bytes *json, Probl
     if (run->inquiry.study != NULL)
         printf("Study: %s\n", run->inquiry.study->kind->name);
     putchar('\n');
-    return print_table_print_json(json, &view, terminal_table_form(), stdout, NULL, problem);
+    const PrintTableForm form = {.has_colour = terminal_table_form().has_colour};
+    return print_table_print_json(json, &view, form, stdout, NULL, problem);
 }
 
 static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {

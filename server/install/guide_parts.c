@@ -63,24 +63,24 @@ static void markdown_sentence(FILE *file, const char *text) {
     fputs(".\n\n", file);
 }
 
-// The lines before the first empty one are examples, the others are text.
+// Blocks of indented lines are code: the first one has examples, others are JSON.
 static void markdown_help(FILE *file, const char *help) {
-    bool is_example = true;
-    fputs("```sh not-run\n", file);
-    for (; *help != '\0'; help += strcspn(help, "\n") + 1) {
+    bool is_code = false;
+    for (const char *at = help; *at != '\0'; at += strcspn(at, "\n") + 1) {
         char line[512];
-        snprintf(line, sizeof line, "%.*s", (int)strcspn(help, "\n"), help);
-        if (line[0] == '\0') {
-            fputs(is_example ? "```\n\n" : "\n", file);
-            is_example = false;
-        } else if (is_example) {
-            fprintf(file, "%s\n", line + strspn(line, " "));
-        } else {
+        snprintf(line, sizeof line, "%.*s", (int)strcspn(at, "\n"), at);
+        if (is_code && line[0] != ' ')
+            fputs("```\n", file);
+        if (!is_code && line[0] == ' ')
+            fputs(at == help ? "```sh not-run\n" : "```json fragment\n", file);
+        is_code = line[0] == ' ';
+        if (is_code)
+            fputs(line + 2, file);
+        else
             markdown_text(file, line);
-            fputc('\n', file);
-        }
+        fputc('\n', file);
     }
-    fputs(is_example ? "```\n\n" : "\n", file);
+    fputs(is_code ? "```\n\n" : "\n", file);
 }
 
 static void markdown_option(FILE *file, const Field *row) {

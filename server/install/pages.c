@@ -345,8 +345,9 @@ static void completion_bash(FILE *file) {
           "    case $kind in\n"
           "    '' | value) ;;\n"
           "    file) return ;;\n"
-          "    file.*) mapfile -t COMPREPLY < <(compgen -f -X \"!*.${kind#file.}\" -- \"$cur\"\n"
-          "            compgen -d -S / -- \"$cur\")\n"
+          "    file.*) local IFS=$'\\n'\n"
+          "        COMPREPLY=($(compgen -f -X \"!*.${kind#file.}\" -- \"$cur\"\n"
+          "            compgen -d -S / -- \"$cur\"))\n"
           "        compopt -o nospace 2>/dev/null\n"
           "        return ;;\n"
           "    parts) words='",
@@ -357,7 +358,7 @@ static void completion_bash(FILE *file) {
     fputs("\" ;;\n"
           "    *) words=$(\"${COMP_WORDS[0]}\" complete \"$kind\" 2>/dev/null) ;;\n"
           "    esac\n"
-          "    mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$cur\")\n"
+          "    COMPREPLY=($(compgen -W \"$words\" -- \"$cur\"))\n"
           "}\n"
           "complete -o default -F _impactd impactd\n",
           file);
