@@ -38,6 +38,12 @@ def test_submit_prints_the_job_and_waits_for_it():
         assert code == 0 and job["status"] == "successful" and job["title"] == 'a "b"\n', (code, job, errors)
         code, out, errors = client(daemon.url, "submit", SPONGE, "--dry-run")
         assert code == 0 and json.loads(out)["dry_run"] is True, (code, out, errors)
+        edits = ("--set", "dampers.0.clearance=10mm", "--vary", "duration=1:2:3")
+        sent, here = (json.loads(program.run(*words, SPONGE, *edits, environment={**os.environ, "IMPACTD_SERVER": daemon.url})[1])
+                      for words in (("submit", "--dry-run"), ("check", "--json")))
+        assert sent["result"] == here["result"] and sent["scene"]["dampers"][0]["clearance"] == 0.01, sent
+        code, _, errors = client(daemon.url, "submit", SPONGE, "--set", "duration=1kg")
+        assert code == 2 and "impactd submit: --set duration is a time in s, 1kg is a mass" in errors, errors
 
 
 def test_jobs_lists_and_open_names_the_page():
