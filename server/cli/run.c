@@ -159,7 +159,8 @@ typedef struct Finding {
     const Warnings *warnings;
     const Outcome *outcome;
     const Variant *answer;
-    double took; // [s]
+    double took;    // [s]
+    bool is_edited; // by --set or --vary
 } Finding;
 
 static void finding_report(const Finding *finding, Report *report) {
@@ -193,6 +194,8 @@ static void finding_print(const Finding *finding, const char *name, const Termin
     finding_report(finding, &report);
     if (report.next != NULL)
         report_next(&report, "impactd run %s %s", finding->path, report.next);
+    else if (files->count == 0 && finding->is_edited)
+        report_next(&report, "the same command with -o report.html");
     else if (files->count == 0)
         report_next(&report, "impactd %s %s -o report.html", name, finding->path);
     report_print(&report, terminal, files);
@@ -215,7 +218,7 @@ static Status scene_run(const char *path, const StudyRequest *request, const War
     Status status = simulation_run(&request->simulation, &limits, &watch, NULL, &outcome, problem);
     progress_bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
-    const Finding finding = {path, request, warnings, outcome, NULL, took};
+    const Finding finding = {path, request, warnings, outcome, NULL, took, settings->set.count > 0};
     if (status == STATUS_OK && !has_report) {
         warnings_print(path, warnings);
         warnings_print(path, &outcome->warnings);
@@ -489,7 +492,13 @@ static Status study_make(const char *path, const StudyRequest *request, const Wa
         jobs_run_study(request->study, &request->simulation, limits, &watch, &answer, problem);
     progress_bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
-    const Finding finding = {path, request, warnings, NULL, answer, took};
+    const Finding finding = {path,
+                             request,
+                             warnings,
+                             NULL,
+                             answer,
+                             took,
+                             settings->set.count + settings->vary.count > 0};
     char result[72];
     Bytes scene = {0};
     jobs_result_id(request, result);
