@@ -90,6 +90,11 @@ License: Expat
  ${licence}")
 # What Debian wants otherwise than `cmake --install` has it.
 file(WRITE ${PAGES}/deb/prepare.cmake [[
+    find_program(DPKG_SHLIBDEPS dpkg-shlibdeps)
+    find_program(FILE_TYPES file)
+    if(NOT DPKG_SHLIBDEPS OR NOT FILE_TYPES)
+        message(FATAL_ERROR "the package is made with the Debian packages dpkg-dev and file: install them")
+    endif()
     set(root ${CPACK_TEMPORARY_INSTALL_DIRECTORY})
     string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
     file(WRITE ${root}/usr/share/doc/impactd/changelog "impactd (${CPACK_PACKAGE_VERSION}) unstable; urgency=medium

@@ -15,7 +15,7 @@ def need(*tools):
 
 def made(folder, version=None):
     """Makes the package in the folder; its path. Of another version, if one is given."""
-    need("cpack", "dpkg-shlibdeps")
+    need("cpack", "dpkg-shlibdeps", "file")
     command = ["cpack", "-G", "DEB", "-B", folder, "--config", os.path.join(program.build, "CPackConfig.cmake")]
     if version is not None:
         command += ["-D", f"CPACK_PACKAGE_VERSION={version}"]
