@@ -183,8 +183,9 @@ static void report_style(const ReportText *text, const char *style) {
 static void report_wrap(const ReportText *text, const char *words, size_t used, int indent) {
     size_t at = used;
     for (bool is_first = true; *words != '\0'; is_first = false) {
-        const size_t length = strcspn(words, " ");
-        size_t width = 0;
+        size_t length = strcspn(words, " "), width = 0;
+        if (strncmp(words + length, " %", 2) == 0) // stays behind its number
+            length += 1 + strcspn(words + length + 1, " ");
         for (size_t i = 0; i < length; i++)
             width += ((unsigned char)words[i] & 0xC0) != 0x80;
         if (!is_first && at + 1 + width > text->terminal->columns) {

@@ -40,8 +40,10 @@ static const Field *member_find(const Field *fields, const char *path, const cha
     const size_t length = strcspn(path, ".");
     snprintf(name, sizeof name, "%.*s", (int)length, path);
     const Field *row = fields_find(fields, name, &offset);
+    if (row == NULL)
+        return NULL;
     *item += offset;
-    if (row == NULL || path[length] == '\0')
+    if (path[length] == '\0')
         return row;
     *item += row->offset;
     return member_find(row->fields, path + length + 1, item);
@@ -632,6 +634,8 @@ static void study_add_count(Report *report, const StudyReport *of, const Variant
     const char *at[3] = {(const char *)answer, (const char *)answer, (const char *)answer};
     const Field *counted = member_find(fields, of->counted, &at[0]);
     const Field *failed = member_find(fields, "failed", &at[1]);
+    if (failed == NULL) // of a sweep
+        failed = member_find(fields, "table.failed", &at[1]);
     const Field *warnings = member_find(fields, "warnings", &at[2]);
     const void *count = at[0] + counted->offset;
     const bool is_list = counted->kind == FIELD_KIND_LIST;

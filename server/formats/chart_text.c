@@ -48,7 +48,8 @@ static void text_dot(const TextCanvas *canvas, double at_x, double at_y, unsigne
     if (x < 0 || y < 0 || x >= canvas->width || y >= canvas->height)
         return;
     TextCell *cell = text_cell(canvas, x, y);
-    cell->dots |= canvas->form->is_utf8 ? bits[y % 4][x % 2] : (unsigned char)(1 << y % 2);
+    cell->dots =
+        (unsigned char)(cell->dots | (canvas->form->is_utf8 ? bits[y % 4][x % 2] : 1 << y % 2));
     cell->colour = colour;
 }
 
