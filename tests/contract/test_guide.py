@@ -75,7 +75,7 @@ def test_every_link_and_anchor_of_every_page_leads_somewhere():
 
 
 def test_pages_are_served_as_the_dashboard_is():
-    """Type, entity tag (304), the strict policy, HEAD; no token is needed; unknown names are 404, other methods 405."""
+    """Type, entity tag (304), the strict policy, HEAD; unknown names are 404, other methods 405."""
     with program.daemon() as daemon:
         page = daemon.get("/guide/problems.html")
         dashboard = daemon.get("/", headers={"Accept": "text/html"})
