@@ -1,6 +1,6 @@
 # cmake --install build [--prefix X], with DESTDIR for packages: program, manual, completion, unit, schemas.
 include(GNUInstallDirs)
-add_executable(print_pages server/install/pages.c server/install/guide_parts.c)
+add_executable(print_pages server/install/pages.c)
 target_link_libraries(print_pages PRIVATE impactd_server)
 set_target_properties(print_pages PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/install)
 set(PAGES ${CMAKE_BINARY_DIR}/install)
@@ -26,11 +26,13 @@ target_link_libraries(print_guide PRIVATE impactd_server PkgConfig::CMARK ${CMAR
 set_target_properties(print_guide PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/install)
 file(MAKE_DIRECTORY ${GUIDE})
 add_custom_command(OUTPUT ${GUIDE_PAGES} ${GUIDE_COPIES}
-    COMMAND sh -c "jq -r -f '${PROJECT_SOURCE_DIR}/web/guide/api.jq' '${PROJECT_SOURCE_DIR}/schema/openapi.json' > '${PAGES}/api.md'"
+    COMMAND sh -c "jq -r -L web/guide 'include \"parts\"; api' schema/openapi.json > '${PAGES}/api.md'"
+    COMMAND sh -c "jq -r -L web/guide 'include \"parts\"; scene' schema/scene.schema.json > '${PAGES}/scene.md'"
     COMMAND print_guide ${PROJECT_SOURCE_DIR}/web/guide ${PAGES} ${GUIDE}
     COMMAND ${CMAKE_COMMAND} -E copy ${GUIDE_FILES} ${GUIDE}
-    DEPENDS print_guide ${GUIDE_SOURCES} ${GUIDE_FILES} web/guide/guide.html web/guide/pages.txt web/guide/api.jq
-        schema/openapi.json ${PAGES}/impactd.1
+    DEPENDS print_guide ${GUIDE_SOURCES} ${GUIDE_FILES} web/guide/guide.html web/guide/pages.txt web/guide/parts.jq
+        schema/openapi.json schema/scene.schema.json ${PAGES}/impactd.1
+    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
     COMMENT "Rendering the guide"
     VERBATIM)
 impactd_embed(impactd guide ${CMAKE_BINARY_DIR} ${GUIDE_PAGES} ${GUIDE_COPIES})

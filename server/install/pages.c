@@ -1,6 +1,7 @@
 // print_pages DIRECTORY: the manual pages, the bash completion and parts of the guide, printed from
 // the tables of the program. A tool of the build, not part of the program.
 #include <ctype.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,7 +10,7 @@
 #include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/cli/client.h"
-#include "server/install/guide_parts.h"
+#include "server/http/router.h"
 #include "server/options.h"
 
 // Text as source of man(7), in which a backslash, and a point or quote at the start of a line, are
@@ -165,16 +166,41 @@ static void manual_program(FILE *file) {
     fputs(back, file);
 }
 
+static const char *kind_name(const Field *row) {
+    static const char *const names[] = {
+        [FIELD_KIND_REAL] = "number",          [FIELD_KIND_COUNT] = "whole number",
+        [FIELD_KIND_FLAG] = "true or false",   [FIELD_KIND_TEXT] = "text",
+        [FIELD_KIND_CHOICE] = "text",          [FIELD_KIND_REALS] = "numbers",
+        [FIELD_KIND_ROWS] = "rows of numbers", [FIELD_KIND_TEXTS] = "texts",
+        [FIELD_KIND_ITEM] = "object",          [FIELD_KIND_LIST] = "objects",
+        [FIELD_KIND_VARIANT] = "object"};
+    return (size_t)row->kind < COUNT(names) && names[row->kind] != NULL ? names[row->kind] : "";
+}
+
+// "number [kg], above 0; required"
 static void nature_print(FILE *file, const Field *row) {
-    Bytes nature = {.most = 0}, initial = {.most = 0};
-    nature_write(row, &nature);
-    default_write(row, &initial);
-    escaped(file, nature.at, false);
-    if (initial.count > 0)
-        fputs(row->presence == PRESENCE_REQUIRED ? "; " : "; default ", file);
-    escaped(file, initial.count > 0 ? initial.at : "", false);
-    bytes_clear(&nature);
-    bytes_clear(&initial);
+    char least[32], most[32];
+    fputs(kind_name(row), file);
+    unit_print(file, row);
+    const bool has_range = row->kind == FIELD_KIND_REAL || row->kind == FIELD_KIND_COUNT ||
+                           row->kind == FIELD_KIND_REALS || row->kind == FIELD_KIND_ROWS;
+    if (has_range && isfinite(row->range.min) && isfinite(row->range.max))
+        fprintf(file, ", %s to %s", text_real(least, row->range.min),
+                text_real(most, row->range.max));
+    else if (has_range && isfinite(row->range.min))
+        fprintf(file, ", %s %s", row->range.is_open_below ? "above" : "at least",
+                text_real(least, row->range.min));
+    for (size_t i = 0; row->choices != NULL && row->choices[i] != NULL; i++) {
+        fputs(i > 0 ? ", " : ": ", file);
+        escaped(file, row->choices[i], false);
+    }
+    if (row->presence == PRESENCE_REQUIRED)
+        fputs("; required", file);
+    else if (row->presence == PRESENCE_DEFAULT && row->kind == FIELD_KIND_CHOICE)
+        fprintf(file, "; default %s", row->choices[(int)row->initial]);
+    else if (row->presence == PRESENCE_DEFAULT &&
+             (row->kind == FIELD_KIND_REAL || row->kind == FIELD_KIND_COUNT))
+        fprintf(file, "; default %s", text_real(least, row->initial));
 }
 
 static void rows_print(FILE *file, const Field *fields, const char *place) {
@@ -364,13 +390,122 @@ static void completion_bash(FILE *file) {
           file);
 }
 
+// --- parts of the guide, in Markdown ---
+
+// Text in which no character is markup.
+static void markdown_text(FILE *file, const char *text) {
+    for (const char *c = text; *c != '\0'; c++) {
+        if (strchr("\\`*_{}[]<>#|~&!", *c) != NULL)
+            fputc('\\', file);
+        fputc(*c, file);
+    }
+}
+
+// A paragraph of one sentence, which has no capital and no point in the tables.
+static void markdown_sentence(FILE *file, const char *text) {
+    fputc(toupper((unsigned char)text[0]), file);
+    markdown_text(file, text + (text[0] != '\0'));
+    fputs(".\n\n", file);
+}
+
+// Blocks of indented lines are code: the first one has examples, others are JSON.
+static void markdown_help(FILE *file, const char *help) {
+    bool is_code = false;
+    for (const char *at = help; *at != '\0'; at += strcspn(at, "\n") + 1) {
+        char line[512];
+        snprintf(line, sizeof line, "%.*s", (int)strcspn(at, "\n"), at);
+        if (is_code && line[0] != ' ')
+            fputs("```\n", file);
+        if (!is_code && line[0] == ' ')
+            fputs(at == help ? "```sh not-run\n" : "```json fragment\n", file);
+        is_code = line[0] == ' ';
+        if (is_code)
+            fputs(line + 2, file);
+        else
+            markdown_text(file, line);
+        fputc('\n', file);
+    }
+    fputs(is_code ? "```\n\n" : "\n", file);
+}
+
+static void markdown_option(FILE *file, const Field *row) {
+    char name[OPTION_NAME];
+    const char letter = option_spell(row, name);
+    fputs("| ", file);
+    if (letter != '\0')
+        fprintf(file, "`-%c`, ", letter);
+    fprintf(file, "`%s", name);
+    if (row->kind == FIELD_KIND_CHOICE)
+        for (size_t i = 0; row->choices[i] != NULL; i++)
+            fprintf(file, "%s%s", i > 0 ? "\\|" : " ", row->choices[i]);
+    else if (option_operand(row) != NULL)
+        fprintf(file, " %s", option_operand(row));
+    fputs("` | ", file);
+    markdown_text(file, row->doc);
+    if (row->unit != NULL) {
+        fputs(" [", file);
+        markdown_text(file, row->unit);
+        fputs("]", file);
+    }
+    fputs(" |\n", file);
+}
+
+// Tables of the options, one below each heading.
+static void markdown_options(FILE *file, const Command *command) {
+    const OptionGroup *group = command->groups;
+    for (const Field *row = command->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
+        const bool is_first =
+            group != NULL && group->first != NULL && strcmp(group->first, row->name) == 0;
+        if (is_first)
+            fprintf(file, "\n**%s**\n", group++->title);
+        if (is_first || row == command->options)
+            fputs("\n| option | meaning |\n|---|---|\n", file);
+        markdown_option(file, row);
+    }
+    fputc('\n', file);
+}
+
+static void part_commands(FILE *file) {
+    const OptionGroup *group = command_groups;
+    for (size_t i = 0; commands[i] != NULL; i++) {
+        const Command *command = commands[i];
+        if (group->first != NULL && strcmp(group->first, command->name) == 0)
+            fprintf(file, "## %s\n\n", group++->title);
+        fprintf(file, "### impactd %s\n\n", command->name);
+        markdown_sentence(file, command->summary);
+        fprintf(file, "```\nimpactd %s%s%s%s\n```\n\n", command->name,
+                command->options != NULL ? " [OPTION]..." : "",
+                command->operands != NULL ? " " : "",
+                command->operands != NULL ? command->operands : "");
+        markdown_help(file, command->help);
+        markdown_options(file, command);
+    }
+}
+
+// All calls of the API with their scopes.
+static void part_paths(FILE *file) {
+    fputs("| call | scope | meaning |\n|---|---|---|\n", file);
+    for (const Route *route = routes; route->method != NULL; route++) {
+        fprintf(file, "| [%s %s](#", route->method, route->pattern);
+        for (const char *c = route->method; *c != '\0'; c++)
+            fputc(tolower((unsigned char)*c), file);
+        fputc('-', file);
+        for (const char *c = route->pattern; *c != '\0'; c++)
+            if (strchr("/{}@.", *c) == NULL)
+                fputc(*c, file);
+        fprintf(file, ") | %s | ", route->scope);
+        markdown_text(file, route->doc);
+        fputs(" |\n", file);
+    }
+}
+
 static const struct {
     const char *name;
     void (*print)(FILE *file);
 } pages[] = {
     {"impactd.1", manual_program},     {"impactd-scene.5", manual_scene},
     {"impactd.bash", completion_bash}, {"commands.md", part_commands},
-    {"scene.md", part_scene},          {"paths.md", part_paths},
+    {"paths.md", part_paths},
 };
 
 static FILE *page_open(const char *folder, const char *name) {
