@@ -508,32 +508,28 @@ static const struct {
     {"paths.md", part_paths},
 };
 
-static FILE *page_open(const char *folder, const char *name) {
+// Writes one page, or that of a command.
+static bool page_write(const char *folder, const char *name, void (*print)(FILE *file),
+                       const Command *command) {
     char path[4096];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
+    snprintf(path, sizeof path, "%s/%s%s%s", folder, name, command != NULL ? command->name : "",
+             command != NULL ? ".1" : "");
     FILE *file = fopen(path, "w");
-    if (file == NULL)
+    if (file != NULL && command != NULL)
+        manual_command(file, command);
+    else if (file != NULL)
+        print(file);
+    const bool is_written = file != NULL && fclose(file) == 0;
+    if (!is_written)
         perror(path);
-    return file;
+    return is_written;
 }
 
 int main(int argc, char **argv) {
-    FILE *file;
-    for (size_t i = 0; argc == 2 && i < COUNT(pages); i++) {
-        if ((file = page_open(argv[1], pages[i].name)) == NULL)
-            return 1;
-        pages[i].print(file);
-        if (fclose(file) != 0)
-            return 1;
-    }
-    for (size_t i = 0; argc == 2 && commands[i] != NULL; i++) {
-        char name[64];
-        snprintf(name, sizeof name, "impactd-%s.1", commands[i]->name);
-        if ((file = page_open(argv[1], name)) == NULL)
-            return 1;
-        manual_command(file, commands[i]);
-        if (fclose(file) != 0)
-            return 1;
-    }
-    return argc == 2 ? 0 : 2;
+    bool is_written = argc == 2;
+    for (size_t i = 0; is_written && i < COUNT(pages); i++)
+        is_written = page_write(argv[1], pages[i].name, pages[i].print, NULL);
+    for (size_t i = 0; is_written && commands[i] != NULL; i++)
+        is_written = page_write(argv[1], "impactd-", NULL, commands[i]);
+    return argc != 2 ? 2 : is_written ? 0 : 1;
 }
