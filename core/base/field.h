@@ -128,7 +128,8 @@ enum {
     FIELD_PAIRS = 4,
     // REALS: a JSON number is also allowed as a list of one, and a list of one is written so.
     FIELD_LONE = 8,
-    // TEXTS: an allowed text may end with a number from 1: "displacement_2".
+    // TEXTS: an allowed text may end with a number from 1: "displacement_2". Not validated by the
+    // row: which texts and numbers are possible depends on other members.
     FIELD_NUMBERED = 16,
     // TEXT, TEXTS: it, or each, is a JSON number, string, true or false, stored as JSON text.
     // CHOICE: the choices are false and true.

@@ -74,20 +74,13 @@ static bool field_allows_text(const char *const *texts, const char *text, size_t
 static Status field_check_texts(const Field *field, const Texts *texts, const char *pointer,
                                 Problem *problem) {
     Status status = field_check_length(field->max, texts->count, "texts", pointer, problem);
-    if (status != STATUS_OK || field->choices == NULL)
+    if (status != STATUS_OK || field->choices == NULL || (field->flags & FIELD_NUMBERED) != 0)
         return status;
     for (size_t i = 0; i < texts->count; i++) {
         const char *text = texts->at[i];
-        size_t length = strlen(text);
-        if (field_allows_text(field->choices, text, length))
+        if (field_allows_text(field->choices, text, strlen(text)))
             continue;
-        if ((field->flags & FIELD_NUMBERED) != 0) {
-            (void)field_name_number(text, &length);
-            if (field_allows_text(field->choices, text, length))
-                continue;
-        }
-        const JsonPointer place = json_pointer_at(pointer, i);
-        status = spelling_reject_numbered(field->choices, text, length, place.at, problem);
+        status = spelling_reject(field->choices, text, json_pointer_at(pointer, i).at, problem);
     }
     return status;
 }

@@ -120,16 +120,30 @@ static Status channel_names_expand(Texts *names, const ChannelCounts *counts, bo
     return STATUS_OK;
 }
 
+// Offers the channels that the scene has, or all if it is not known.
+static Status channel_names_reject(const char *name, const ChannelCounts *counts,
+                                   const char *pointer, Problem *problem) {
+    const char *offered[1 + CHANNEL_COUNT + 1];
+    size_t count = 0, length;
+    for (size_t i = 0; channel_requests[i] != NULL; i++)
+        if (i == 0 || counts->structure == NULL || channel_counts_of(counts, &channels[i - 1]) > 0)
+            offered[count++] = channel_requests[i];
+    offered[count] = NULL;
+    (void)field_name_number(name, &length);
+    return spelling_reject_numbered(offered, name, length, pointer, problem);
+}
+
 static Status channel_names_check(const char *name, const ChannelCounts *counts,
                                   const char *pointer, Problem *problem) {
     size_t number;
     const Channel *channel = channel_find(name, &number);
-    if (strcmp(name, CHANNEL_USUAL) == 0)
+    const bool is_usual = strcmp(name, CHANNEL_USUAL) == 0;
+    if (channel == NULL && !is_usual)
+        return channel_names_reject(name, counts, pointer, problem);
+    if (counts->structure == NULL)
+        return STATUS_OK;
+    if (is_usual)
         return problem_add(problem, STATUS_INVALID, pointer, "is asked for twice");
-    if (channel == NULL)
-        return problem_concerns(problem, pointer)
-                   ? STATUS_OK // reported with the fields
-                   : spelling_reject(channel_requests, name, pointer, problem);
     const size_t most = channel_counts_of(counts, channel);
     if (most == 0 && channel->owner == CHANNEL_OF_STOREY)
         return problem_add(problem, STATUS_INVALID, pointer,
@@ -175,7 +189,7 @@ Status channel_names_complete(const Scene *scene, Texts *names, bool is_spectrum
     Status status = STATUS_OK;
     for (size_t i = 0; i < names->count; i++) {
         const JsonPointer place = json_pointer_at(pointer, expanded_names_index(&expanded, i));
-        if (are_known && channel_names_check(names->at[i], &counts, place.at, problem) != STATUS_OK)
+        if (channel_names_check(names->at[i], &counts, place.at, problem) != STATUS_OK)
             status = STATUS_INVALID;
         size_t first = 0;
         while (first < i && strcmp(names->at[i], names->at[first]) != 0)

@@ -300,15 +300,13 @@ static double comparison_relative(double value, double from) {
 
 static CompareDifferences comparison_differences(const Outcome *reference, const Outcome *outcome) {
     const Summary *from = &reference->summary, *to = &outcome->summary;
-    const bool have_force = outcome_has_force(reference) && outcome_has_force(outcome);
     return (CompareDifferences){
         comparison_relative(to->peak_displacement, from->peak_displacement),
         comparison_relative(to->rms_displacement, from->rms_displacement),
         comparison_relative(to->peak_acceleration, from->peak_acceleration),
         comparison_relative(to->rms_acceleration, from->rms_acceleration),
         (double)to->impacts - (double)from->impacts,
-        have_force ? comparison_relative(to->peak_contact_force, from->peak_contact_force)
-                   : (double)NAN,
+        comparison_relative(to->peak_contact_force, from->peak_contact_force),
     };
 }
 
@@ -436,8 +434,7 @@ static Status comparison_run_reference(CompareWork *work, const StudyTools *tool
     Status status = comparison_apply(work->study, work->work.simulation,
                                      &work->answer->entries.at[0], tools->limits, &scene, problem);
     if (status == STATUS_OK)
-        status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
-                                &work->reference, problem);
+        status = study_run_scene(&scene, tools, &work->reference, problem);
     simulation_clear(&scene);
     if (status != STATUS_OK) {
         char detail[sizeof problem->detail];
@@ -468,8 +465,6 @@ static Status comparison_begin(void *of, const StudyTools *tools, Problem *probl
     TRY(study_copy_reals(reference->spectrum.frequency, densities->rows, &answer->frequency));
     first->steps = reference->steps;
     first->summary = reference->summary;
-    if (!outcome_has_force(reference)) // as in the other entries
-        first->summary.peak_contact_force = (double)NAN;
     TRY(comparison_measure(work, reference, tools->progress, first, problem));
     work->work.members = answer->entries.count - 1;
     work->work.part_bytes =

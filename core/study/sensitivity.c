@@ -500,7 +500,6 @@ typedef struct SensitivityWork {
     const SensitivityStudy *study;
     const Simulation *simulation;
     Sensitivity *answer;
-    bool has_force;
     Outcome *own;                        // of the scene itself
     size_t rows[SENSITIVITY_PARAMETERS]; // of the answer, those that have steps
     size_t steps;                        // members
@@ -625,7 +624,7 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index) {
     for (int metric = 0; metric < STATISTICS_USUAL; metric++) {
         const double value = statistics_value(&work->own->summary, metric);
         double quotients[SENSITIVITY_STEPS];
-        if (metric == STATISTICS_PEAK_CONTACT_FORCE && !work->has_force)
+        if (metric == STATISTICS_PEAK_CONTACT_FORCE && isnan(value))
             continue;
         for (size_t step = 0; step < SENSITIVITY_STEPS; step++) {
             const size_t low = index * ROW_STEPS + step * SIDES;
@@ -644,15 +643,12 @@ static Status sensitivity_fill_row(const SensitivityWork *work, size_t index) {
 
 static Status sensitivity_fill_statistics(const SensitivityWork *work) {
     Sensitivity *answer = work->answer;
-    static const RunTable none = {NULL, 0};
     for (int metric = 0; metric < STATISTICS_USUAL; metric++) {
-        const bool is_known = metric != STATISTICS_PEAK_CONTACT_FORCE || work->has_force;
         RunStatistic *statistic = list_append(&answer->statistics, sizeof *statistic);
         TRY(status_made(statistic != NULL));
         (void)fields_default(sensitivity_statistic_fields, statistic); // nothing to allocate
-        if (is_known)
-            statistic->value = statistics_value(&work->own->summary, metric);
-        TRY(statistics_fill(is_known ? &answer->table : &none, metric, statistic));
+        statistic->value = statistics_value(&work->own->summary, metric);
+        TRY(statistics_fill(&answer->table, metric, statistic));
     }
     return STATUS_OK;
 }
@@ -761,8 +757,7 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
     Simulation scene = {0};
     Status status = sensitivity_copy(work->simulation, &scene);
     if (status == STATUS_OK)
-        status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
-                                &work->own, problem);
+        status = study_run_scene(&scene, tools, &work->own, problem);
     simulation_clear(&scene);
     TRY(status);
     const double horizon = work->own->summary.trust_horizon;
@@ -794,7 +789,6 @@ static Status sensitivity_begin(void *of, const StudyTools *tools, Problem *prob
     Sensitivity *answer = work->answer = work->work.answer;
     const size_t runs = (size_t)study->runs;
     work->simulation = work->work.simulation;
-    work->has_force = simulation_has_force(work->simulation);
     answer->runs = study->runs;
     answer->seed = study->seed;
     answer->confidence = STATISTICS_CONFIDENCE;

@@ -137,6 +137,14 @@ void study_run_fix_solver(Simulation *target) {
     accuracy->metric = CHOICE_ABSENT; // as in a completed scene
 }
 
+Status study_run_scene(const Simulation *scene, const StudyTools *tools, Outcome **outcome,
+                       Problem *problem) {
+    TRY(simulation_run(scene, tools->limits, tools->progress, tools->workspace, outcome, problem));
+    if (!simulation_has_force(scene))
+        (*outcome)->summary.peak_contact_force = (double)NAN;
+    return STATUS_OK;
+}
+
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem) {
     const StudyKind *kind = study_kind(study);
@@ -183,9 +191,7 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     run->status = kind->scene(work, member, &scene, part, problem);
     part->is_refused = run->status != STATUS_OK;
     if (run->status == STATUS_OK)
-        run->status = simulation_run(&scene, tools->limits, tools->progress, tools->workspace,
-                                     &outcome, problem);
-    const bool has_force = run->status == STATUS_OK && simulation_has_force(&scene);
+        run->status = study_run_scene(&scene, tools, &outcome, problem);
     simulation_clear(&scene);
     if (study_run_ends_study(run->status))
         return study_result(run->status, problem);
@@ -197,8 +203,6 @@ Status study_part_make(const StudyWork *work, size_t member, const StudyTools *t
     Status status = STATUS_OK;
     run->steps = outcome->steps;
     run->summary = outcome->summary;
-    if (!has_force) // no number, else an optimum would prefer contacts without a force
-        run->summary.peak_contact_force = (double)NAN;
     if (outcome->has_reduction)
         run->reduction = outcome->reduction;
     if (kind->keep != NULL)

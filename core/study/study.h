@@ -107,6 +107,10 @@ Status study_run_copy(const Simulation *simulation, Simulation *target);
 // study could use different settings, and their differences would not be those of the scenes.
 void study_run_fix_solver(Simulation *target);
 
+// Runs a scene. The peak force of contacts without a force is unknown: as 0 it would be the best.
+Status study_run_scene(const Simulation *scene, const StudyTools *tools, Outcome **outcome,
+                       Problem *problem);
+
 // Whether a failure of one run ends the whole study.
 static inline bool study_run_ends_study(Status status) {
     return status == STATUS_CANCELLED || status == STATUS_NO_MEMORY;

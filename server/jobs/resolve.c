@@ -600,13 +600,21 @@ static Status names_resolve(NameResolver *names, const Dampers *dampers) {
     return status;
 }
 
+// Whether a fault lies outside of the study.
+static bool problem_concerns_scene(const Problem *problem) {
+    for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++)
+        if (strncmp(problem->faults[i].pointer, "/study/", 7) != 0)
+            return true;
+    return false;
+}
+
 // Resolves and completes a study with its scene. The fault of an unknown name on an axis is
 // reported beside those of the other values, and replaces what the same name leads to there.
 static Status study_resolve(Db *db, StudyRequest *request, const SimulationLimits *limits,
                             Warnings *warnings, Problem *problem) {
     NameResolver names = {db, request_references(request), 0, warnings, problem};
     // If the scene has faults of its own, the axes are validated with it.
-    const bool has_own = problem->count > 0;
+    const bool has_own = problem_concerns_scene(problem);
     const Status resolved = names_resolve(&names, &request->simulation.scene.dampers);
     if (resolved == STATUS_LIMIT || problem->count >= PROBLEM_FAULTS)
         return STATUS_INVALID; // names that were not looked up are not validated further

@@ -228,7 +228,7 @@ void bytes_json(Bytes *bytes, const char *format, ...) {
             bytes_format(bytes, "%llu", va_arg(arguments, unsigned long long));
             at += 4;
         } else if (*at != '\0') {
-            assert(!"a conversion that bytes_json does not have");
+            assert(false && "a conversion that bytes_json does not have");
             break;
         }
     }

@@ -162,6 +162,9 @@ def test_every_fault_of_every_point_is_told_at_its_value():
         assert "mass" in found["/study/axes/2/pointer"]["detail"]
         found = errors(daemon, sweep({"pointer": "/dampers/0/clearance", "from": 0.01, "to": -1, "count": 3}))
         assert "point 1" in found["/study/axes/0"]["detail"]
+        wrong = sweep(values("/dampers/0/mas", 1))
+        wrong["study"]["mod"] = "grid"  # an unknown key hides no other fault of the study
+        assert set(errors(daemon, wrong)) == {"/study/mod", "/study/axes/0/pointer"}
 
 
 def test_axes_that_make_no_sense_are_refused():

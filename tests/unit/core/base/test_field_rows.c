@@ -110,24 +110,6 @@ TEST(a_name_may_carry_a_number) {
     assert_true(field_name_number("", &length) == 0 && length == 0);
 }
 
-TEST(numbered_names_are_judged_without_their_number) {
-    double one = 1;
-    char long_name[200];
-    memset(long_name, 'd', sizeof long_name - 1);
-    long_name[sizeof long_name - 1] = '\0';
-    const char *names[] = {"displacement", "contact_force_2", "displacment_3", "displacement_0",
-                           long_name};
-    Matrix matrix = matrix_of(1, &(const Reals){&one, 1});
-    matrix.names = texts_of(COUNT(names), names);
-    assert_int_equal(check(&matrix), STATUS_INVALID);
-    assert_int_equal(problem.count, 3);
-    assert_string_equal(problem.faults[0].pointer, "/names/2");
-    assert_string_equal(problem.faults[0].did_you_mean, "displacement_3");
-    assert_string_equal(problem.faults[0].detail, "must be one of displacement, contact_force");
-    assert_string_equal(problem.faults[1].pointer, "/names/3");
-    fields_clear(fields, &matrix);
-}
-
 TEST(pointers_are_cut_at_their_room_and_escaped) {
     char target[16], name[2000];
     json_pointer_join(target, sizeof target, "/a", "b/c~d");

@@ -88,10 +88,22 @@ TEST(the_usual_ones_have_a_name_and_may_stand_beside_others) {
                  "acceleration_1 acceleration_2 acceleration_3",
                  "velocity_1 mean_acceleration_3");
     document_refuse(ONE WANT("\"usual\", \"usual\""), "/output/channels/1", "is asked for twice");
-    document_refuse(ONE WANT("\"usual_2\""), "/output/channels/0",
-                    "must be one of usual, displacement, velocity, acceleration, "
-                    "mean_acceleration, damper_displacement, damper_velocity, penetration, "
-                    "contact_force, base_acceleration, storey_drift, base_shear");
+}
+
+TEST(names_that_the_scene_has_are_offered) {
+    static const char names[] = "must be one of usual, displacement, velocity, acceleration, "
+                                "mean_acceleration, base_acceleration, base_shear";
+    static const char of_frame[] = "must be one of usual, displacement, velocity, acceleration, "
+                                   "mean_acceleration, base_acceleration, storey_drift, base_shear";
+    char long_name[200];
+    memset(long_name, 'd', sizeof long_name - 1);
+    long_name[sizeof long_name - 1] = '\0';
+    char members[400];
+    snprintf(members, sizeof members, ONE WANT("\"%s\""), long_name);
+    document_refuse(members, "/output/channels/0", names);
+    document_refuse(ONE WANT("\"usual_2\""), "/output/channels/0", names);
+    document_refuse(FRAME WANT("\"displacment_3\""), "/output/channels/0", of_frame);
+    document_refuse(FRAME WANT("\"displacement_0\""), "/output/channels/0", of_frame);
 }
 
 // "usual" stands for several names; places are the document's all the same.
