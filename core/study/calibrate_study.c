@@ -15,7 +15,7 @@ static const double structured = 0.05; // of the motion: rms of residuals that i
 // Correlation of neighbouring residuals that is not of noise, in standard errors, and that of
 // residuals that are not noise for the most part.
 static const double correlated_errors = 3.3, smooth_errors = 4, smooth_min = 0.2;
-static const double rms_min = 1e-100; // of samples and noise: squares of less underflow
+static const double rms_min = 1e-100; // of samples: squares of less underflow
 // Of the expected variance: spectra that differ. Those of chaotic motions scatter more than those
 // of noise: few strong impacts make most of them.
 static const double spectrum_misfit = 2, spectrum_misfit_chaos = 9;
@@ -30,7 +30,7 @@ static const Field measured_channel_fields[] = {
     FIELD_REALS(MeasuredChannel, samples, NULL, WITHIN(-1e100, 1e100), MEASURED_SAMPLES, PRESENCE_REQUIRED, "measured values in the channel's unit"),
     FIELD_REAL(MeasuredChannel, interval, "s", ABOVE(0), REQUIRED, "between samples"),
     FIELD_REAL(MeasuredChannel, start, "s", AT_MIN(0), 0, "time of the first sample in the scene"),
-    FIELD_REAL(MeasuredChannel, deviation, NULL, ABOVE(0), OPTIONAL, "standard deviation of the noise in the channel's unit; estimated if absent"),
+    FIELD_REAL(MeasuredChannel, deviation, NULL, AT_MIN(1e-100), OPTIONAL, "standard deviation of the noise in the channel's unit; estimated if absent"),
     FIELD_END
 };
 
@@ -131,10 +131,6 @@ static Status calibrate_check_channel(const CalibrateStudy *study, const Simulat
                                     "have the same value, or differ by less than %g: there is no "
                                     "motion to fit",
                                     rms_min);
-    if (measured.deviation < rms_min)
-        status =
-            json_pointer_fault(problem, place.at, "deviation",
-                               "is less than %g: squares of so little cannot be computed", rms_min);
     if (strcmp(measured.channel, CHANNEL_USUAL) == 0)
         return json_pointer_fault(problem, place.at, "channel",
                                   "must name one channel, as displacement");

@@ -262,7 +262,9 @@ static Status ensemble_complete(void *request, const Simulation *simulation,
 static Status ensemble_base(const EnsembleStudy *study, const Simulation *simulation,
                             Simulation *base) {
     const Texts *names = &simulation->output.channels;
-    TRY(study_run_copy(simulation, base));
+    TRY(fields_copy(simulation_fields, simulation, base)); // each run meets an accuracy target
+    texts_clear(&base->output.channels);
+    base->output.reduction = false;
     for (size_t i = 0; i < names->count && study->inputs.count > 0; i++) {
         size_t number;
         if (channel_find(names->at[i], &number) != &channels[CHANNEL_DISPLACEMENT])

@@ -197,7 +197,6 @@ static Status fragility_make_scene(const Simulation *base, const PinnedRecord *r
 static Status fragility_base(const FragilityStudy *study, const Simulation *simulation,
                              Simulation *base) {
     TRY(study_run_copy(simulation, base));
-    study_run_fix_solver(base);
     texts_clear(&base->output.psd.channels);
     base->output.impacts = false;
     return study_scene_use_record(base, &study->records.at[0]);

@@ -225,7 +225,6 @@ static Status comparison_apply(const CompareStudy *study, const Simulation *simu
     const Kind *kind = kind_find(&contact_kinds, entry->contact_model);
     Output *output = &target->output;
     TRY(study_run_copy(simulation, target));
-    study_run_fix_solver(target);
     TRY(comparison_set_contact(target, (const ContactLaw *)(const void *)kind, entry->separation,
                                problem));
     TRY(comparison_set_channel(&target->scene, CHANNEL_DISPLACEMENT, study->storey,

@@ -514,12 +514,6 @@ static int sensitivity_parameter(const char *name) {
     return parameter;
 }
 
-static Status sensitivity_copy(const Simulation *simulation, Simulation *target) {
-    TRY(study_run_copy(simulation, target));
-    study_run_fix_solver(target);
-    return STATUS_OK;
-}
-
 static Status sensitivity_cost(const void *request, const Simulation *simulation,
                                const SimulationLimits *limits, double *steps) {
     const SensitivityStudy *study = request;
@@ -529,7 +523,7 @@ static Status sensitivity_cost(const void *request, const Simulation *simulation
     for (size_t i = 0; i < study->parameters.count; i++)
         if (perturbation_refuse(simulation, sensitivity_parameter(study->parameters.at[i])) == NULL)
             runs += ROW_STEPS;
-    const Status status = sensitivity_copy(simulation, &member);
+    const Status status = study_run_copy(simulation, &member);
     if (status == STATUS_OK)
         *steps = (double)runs * simulation_cost(&member).steps;
     simulation_clear(&member);
@@ -549,7 +543,7 @@ static Status sensitivity_scene(const void *of, size_t member, Simulation *scene
                                 Problem *problem) {
     const SensitivityWork *work = of;
     (void)problem;
-    TRY(sensitivity_copy(work->simulation, scene));
+    TRY(study_run_copy(work->simulation, scene));
     if (member < work->steps) {
         const int parameter = work->answer->response.at[work->rows[member / ROW_STEPS]].parameter;
         const size_t step = member % ROW_STEPS / SIDES;
@@ -755,7 +749,7 @@ static Status sensitivity_run_scene(SensitivityWork *work, const StudyTools *too
                                     Problem *problem) {
     Sensitivity *answer = work->answer;
     Simulation scene = {0};
-    Status status = sensitivity_copy(work->simulation, &scene);
+    Status status = study_run_copy(work->simulation, &scene);
     if (status == STATUS_OK)
         status = study_run_scene(&scene, tools, &work->own, problem);
     simulation_clear(&scene);

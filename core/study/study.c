@@ -122,19 +122,20 @@ Status study_run_check_names(const Texts *given, const char *const *names, const
     return fields_validate(rows, given, "/study", problem);
 }
 
-Status study_run_copy(const Simulation *simulation, Simulation *target) {
-    TRY(fields_copy(simulation_fields, simulation, target));
-    texts_clear(&target->output.channels);
-    target->output.reduction = false;
-    return STATUS_OK;
-}
-
 void study_run_fix_solver(Simulation *target) {
     AccuracyAuto *accuracy = (AccuracyAuto *)(void *)target->accuracy;
     if (!simulation_has_target(target))
         return;
     accuracy->target = (double)NAN;
     accuracy->metric = CHOICE_ABSENT; // as in a completed scene
+}
+
+Status study_run_copy(const Simulation *simulation, Simulation *target) {
+    TRY(fields_copy(simulation_fields, simulation, target));
+    study_run_fix_solver(target);
+    texts_clear(&target->output.channels);
+    target->output.reduction = false;
+    return STATUS_OK;
 }
 
 Status study_run_scene(const Simulation *scene, const StudyTools *tools, Outcome **outcome,

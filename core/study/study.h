@@ -99,13 +99,13 @@ Status study_run_check_densities(const Simulation *simulation, double densities,
 Status study_run_check_names(const Texts *given, const char *const *names, const char *member,
                              Problem *problem);
 
-// The scene without sampled channels and without its undamped run; spectra and impacts as in the
-// original. `target` is cleared by simulation_clear in any case.
-Status study_run_copy(const Simulation *simulation, Simulation *target);
-
 // Replaces an accuracy target by the solver that is chosen without one: otherwise the runs of one
 // study could use different settings, and their differences would not be those of the scenes.
 void study_run_fix_solver(Simulation *target);
+
+// The scene with this solver, without sampled channels and without its undamped run; spectra and
+// impacts as in the original. `target` is cleared by simulation_clear in any case.
+Status study_run_copy(const Simulation *simulation, Simulation *target);
 
 // Runs a scene. The peak force of contacts without a force is unknown: as 0 it would be the best.
 Status study_run_scene(const Simulation *scene, const StudyTools *tools, Outcome **outcome,
