@@ -590,7 +590,7 @@ typedef struct StudyReport {
 // clang-format off
 static const StudyReport all[] = {
     {&study_tradeoff, "points", "settings", tradeoff_report,
-     {{"points", "Settings that no other one beats", "name=setting|cpu_minimum=CPU [s]|steps|errors.displacement|errors.psd", "is_best", false, 0}},
+     {{"points", "Settings that no other one beats, with their errors", "name=setting|cpu_minimum=CPU [s]|steps|errors.displacement|errors.psd", "is_best", false, 0}},
      {{"points", "All settings", "name=setting|status|cpu_minimum=CPU [s]|steps|errors.displacement|errors.mean_acceleration|errors.peak_force|errors.impacts|errors.psd|why", NULL, true, 0}},
      "Error against CPU time", 1, 12, NULL},
     {&study_ensemble, "runs", "runs", ensemble_report,

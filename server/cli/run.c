@@ -160,7 +160,7 @@ typedef struct Finding {
     const Outcome *outcome;
     const Variant *answer;
     double took;    // [s]
-    bool is_edited; // by --set or --vary
+    bool is_edited; // the path alone is not the scene: --set, --vary or --record
 } Finding;
 
 static void finding_report(const Finding *finding, Report *report) {
@@ -218,7 +218,13 @@ static Status scene_run(const char *path, const StudyRequest *request, const War
     Status status = simulation_run(&request->simulation, &limits, &watch, NULL, &outcome, problem);
     progress_bar_stop(&bar);
     const double took = (double)(clock_monotonic_ns() - began_ns) * 1e-9;
-    const Finding finding = {path, request, warnings, outcome, NULL, took, settings->set.count > 0};
+    const Finding finding = {path,
+                             request,
+                             warnings,
+                             outcome,
+                             NULL,
+                             took,
+                             settings->set.count + settings->record.count > 0};
     if (status == STATUS_OK && !has_report) {
         warnings_print(path, warnings);
         warnings_print(path, &outcome->warnings);
@@ -498,7 +504,8 @@ static Status study_make(const char *path, const StudyRequest *request, const Wa
                              NULL,
                              answer,
                              took,
-                             settings->set.count + settings->vary.count > 0};
+                             settings->set.count + settings->vary.count + settings->record.count >
+                                 0};
     char result[72];
     Bytes scene = {0};
     jobs_result_id(request, result);

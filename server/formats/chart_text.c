@@ -207,6 +207,11 @@ static void text_paint(const ChartText *form, unsigned char colour, Bytes *bytes
         bytes_text(bytes, "\033[0m");
 }
 
+static void text_style(const ChartText *form, const char *style, Bytes *bytes) {
+    if (form->has_colour)
+        bytes_format(bytes, "\033[%sm", style);
+}
+
 static void text_repeat(Bytes *bytes, const char *text, size_t count) {
     while (count-- > 0)
         bytes_text(bytes, text);
@@ -317,16 +322,22 @@ static void text_put_heading(const Chart *chart, const TextCanvas *canvas, Bytes
         titled++;
     if (heading == NULL && panel->count > 0)
         heading = panel->series[0].legend != NULL ? panel->series[0].legend : panel->series[0].name;
-    char text[2 * CHART_TEXT], fitted[2 * CHART_TEXT];
-    snprintf(text, sizeof text, "%s%s%s", heading != NULL ? heading : "",
-             titled->x.title != NULL ? " over " : "",
-             titled->x.title != NULL ? titled->x.title : "");
-    text_fit(fitted,
-             canvas->form->columns + 1 < sizeof fitted ? canvas->form->columns + 1 : sizeof fitted,
-             text);
-    bytes_format(bytes, "%s%s%s", canvas->form->has_colour ? "\033[1m" : "", fitted,
-                 canvas->form->has_colour ? "\033[0m" : "");
-    text_put_legend(canvas, text_width(fitted), bytes);
+    const char *title = titled->x.title != NULL ? titled->x.title : "";
+    const char *over = *title != '\0' ? "over " : "";
+    char lines[2][CHART_TEXT + 8], fitted[CHART_TEXT + 8] = "";
+    snprintf(lines[0], sizeof lines[0], "%s", heading != NULL ? heading : "");
+    snprintf(lines[1], sizeof lines[1], "%s%s", over, title);
+    const bool is_one = text_width(lines[0]) + 1 + text_width(lines[1]) <= canvas->form->columns;
+    for (int i = 0; i < 2; i++) {
+        const size_t room = canvas->form->columns + 1;
+        text_fit(fitted, room < sizeof fitted ? room : sizeof fitted, lines[i]);
+        text_style(canvas->form, "1", bytes);
+        bytes_format(bytes, "%s%s", i > 0 && is_one ? " " : "", fitted);
+        text_style(canvas->form, "0", bytes);
+        bytes_text(bytes, i == 0 && !is_one ? "\n" : "");
+    }
+    const size_t used = text_width(fitted) + (is_one ? text_width(lines[0]) + 1 : 0);
+    text_put_legend(canvas, used, bytes);
 }
 
 void chart_write_text(Chart *chart, size_t index, const ChartText *form, Bytes *bytes) {
