@@ -60,6 +60,7 @@ static Status scene_prepare(const Bytes *text, const RecordFiles *records,
     return status;
 }
 
+// Of run and check.
 typedef struct RunSettings {
     char *output;
     bool json;
@@ -327,20 +328,13 @@ const Command command_run = {
     .run = run,
 };
 
-typedef struct CheckSettings {
-    bool json;
-    Texts record, set, vary;
-    int unit;
-    double max_cpu_seconds;
-} CheckSettings;
-
 static const Field check_fields[] = {
-    FIELD_FLAG(CheckSettings, json, false,
+    FIELD_FLAG(RunSettings, json, false,
                "print the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
-    SET_ROW(CheckSettings),
-    VARY_ROW(CheckSettings),
-    RECORD_ROWS(CheckSettings),
-    CPU_ROW(CheckSettings),
+    SET_ROW(RunSettings),
+    VARY_ROW(RunSettings),
+    RECORD_ROWS(RunSettings),
+    CPU_ROW(RunSettings),
     FIELD_END,
 };
 
@@ -365,7 +359,7 @@ static Status plan_print(const char *path, DryRun *run, const Bytes *json, Probl
 }
 
 static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {
-    const CheckSettings *asked = of;
+    const RunSettings *asked = of;
     const JobManagerSettings settings = {
         .workers = 1, .queue_most = 1, .limits = scene_limits(asked->max_cpu_seconds)};
     Db *db = NULL;
@@ -410,7 +404,7 @@ const Command command_check = {
             "damping of each stop, and the estimated cost. Nothing is run. Exit code 3 if the\n"
             "scene has faults.\n",
     .options = check_fields,
-    .size = sizeof(CheckSettings),
+    .size = sizeof(RunSettings),
     .run = check,
 };
 
@@ -751,64 +745,36 @@ const Command command_sweep = {
     .options = sweep_fields,
 };
 
-const Command command_optimize = {
-    STUDY_COMMAND("optimize", &study_optimize, NULL),
-    .summary = "find parameter values that minimize or maximize a metric",
-    .help = "  impactd optimize scene.json\n"
-            "  impactd optimize scene.json -o out.svg -o out.csv\n"
-            "  impactd optimize scene.json --json       # the complete result\n"
-            "\n"
+// A study whose request is all in the scene; `example` is a scene of the program that has one.
+#define SCENE_STUDY(name_text, kind, summary_text, example, prints)                                \
+    const Command command_##name_text = {                                                          \
+        STUDY_COMMAND(#name_text, kind, NULL),                                                     \
+        .summary = summary_text,                                                                   \
+        .help = "  impactd examples " example " -o scene.json\n"                                   \
+                "  impactd " #name_text " scene.json\n"                                            \
+                "  impactd " #name_text " scene.json -o out.svg -o out.csv\n"                      \
+                "  impactd " #name_text " scene.json --json    # the complete result\n"            \
+                "\n" prints                                                                        \
+                "The member \"study\" of the scene describes the study, as that of the example\n"  \
+                "does. Exit code 3 if the scene has faults.\n",                                    \
+        .options = study_fields,                                                                   \
+    }
+
+SCENE_STUDY(optimize, &study_optimize, "find parameter values that minimize or maximize a metric",
+            "optimize_clearance",
             "Prints the best values, the gain, and other values that are nearly as good. With\n"
             "two objectives it prints the front and the best compromise: the point nearest to\n"
-            "the best values of both. The scene describes the study:\n"
-            "\n"
-            "  \"study\": {\"kind\": \"optimize\",\n"
-            "    \"objectives\": [{\"metric\": \"rms_displacement\"}],\n"
-            "    \"variables\": [\n"
-            "      {\"pointer\": \"/dampers/0/clearance\", \"from\": 0.002, \"to\": 0.03}],\n"
-            "    \"over\": {\"runs\": 64}}\n"
-            "\n"
-            "Exit code 3 if the scene has faults.\n",
-    .options = study_fields,
-};
+            "the best values of both.\n");
 
-const Command command_calibrate = {
-    STUDY_COMMAND("calibrate", &study_calibrate, NULL),
-    .summary = "fit parameters of a scene to measured motions",
-    .help = "  impactd calibrate scene.json\n"
-            "  impactd calibrate scene.json -o out.svg -o out.csv\n"
-            "  impactd calibrate scene.json --json       # the complete result\n"
-            "\n"
+SCENE_STUDY(calibrate, &study_calibrate, "fit parameters of a scene to measured motions",
+            "calibrate_free_sponge",
             "Prints the parameters with their intervals, and whether they explain the\n"
-            "measurement. The scene describes the study:\n"
-            "\n"
-            "  \"study\": {\"kind\": \"calibrate\",\n"
-            "    \"parameters\": [\n"
-            "      {\"pointer\": \"/dampers/0/buffer/restitution\", \"from\": 0.3, \"to\": 0.9}],\n"
-            "    \"measured\": [\n"
-            "      {\"channel\": \"displacement\", \"interval\": 0.01, \"samples\": [...]}]}\n"
-            "\n"
-            "Exit code 3 if the scene has faults.\n",
-    .options = study_fields,
-};
+            "measurement.\n");
 
-const Command command_response = {
-    STUDY_COMMAND("response", &study_response, NULL),
-    .summary = "steady motion under a sine over one parameter: response curve",
-    .help = "  impactd response scene.json\n"
-            "  impactd response scene.json -o out.svg -o out.csv\n"
-            "  impactd response scene.json --json       # the complete result\n"
-            "\n"
+SCENE_STUDY(response, &study_response,
+            "steady motion under a sine over one parameter: response curve", "response_sponge",
             "Prints period, stability and peaks at each point. The excitation of the scene\n"
-            "must be a sine. The scene describes the study:\n"
-            "\n"
-            "  \"study\": {\"kind\": \"response\", \"direction\": \"both\",\n"
-            "    \"axis\": {\"pointer\": \"/excitation/frequency\",\n"
-            "             \"from\": 3, \"to\": 5, \"count\": 81}}\n"
-            "\n"
-            "Exit code 3 if the scene has faults.\n",
-    .options = study_fields,
-};
+            "must be a sine.\n");
 
 const Command command_fragility = {
     STUDY_COMMAND("fragility", &study_fragility, NULL),

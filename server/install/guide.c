@@ -20,6 +20,7 @@
 
 #include "core/base/field.h"
 #include "server/cli/files.h"
+#include "server/formats/chart.h"
 
 enum { GUIDE_PAGES = 100, GUIDE_HEADINGS = 1000, GUIDE_PATH = 4096, GUIDE_NAME = 160 };
 
@@ -76,23 +77,6 @@ static void guide_write(const char *name, const char *extension, const Bytes *te
     problem_clear(&problem);
     if (text->is_failed || output_put(path, text, &problem) != STATUS_OK)
         guide_fault(NULL, "%s cannot be written: %s", path, problem.detail);
-}
-
-static void bytes_html(Bytes *bytes, const char *text) {
-    for (const char *c = text; *c != '\0'; c++)
-        switch (*c) {
-        case '<':
-            bytes_text(bytes, "&lt;");
-            break;
-        case '&':
-            bytes_text(bytes, "&amp;");
-            break;
-        case '"':
-            bytes_text(bytes, "&quot;");
-            break;
-        default:
-            bytes_put(bytes, c, 1);
-        }
 }
 
 static const char *bytes_string(const Bytes *bytes) {
@@ -339,40 +323,47 @@ static void page_walk(GuidePage *page, cmark_node *document) {
         node_text(second, &page->purpose);
 }
 
+static void page_put_anchor(const GuideHeading *heading, Bytes *html) {
+    bytes_format(html, " <a class=\"anchor\" href=\"#%s\" aria-label=\"Link to ",
+                 bytes_string(&heading->slug));
+    chart_escape(html, bytes_string(&heading->text));
+    bytes_text(html, "\">#</a>");
+}
+
 // What cmark-gfm wrote, with anchors at headings, and tables in boxes that scroll: since pages have
 // no HTML and text is escaped, these tags are of those elements.
 static void page_finish_html(GuidePage *page, const char *html) {
-    size_t at = 0;
+    static const char *const tags[][2] = {
+        {"<table>", "<div class=\"scroll\" tabindex=\"0\"><table>"},
+        {"</table>", "</table></div>"},
+        {"<pre>", "<pre tabindex=\"0\">"},
+        {"<", "<"},
+    };
+    const GuideHeading *heading = page->headings;
     for (const char *rest = html; *rest != '\0';) {
         const size_t text = strcspn(rest, "<");
         bytes_put(&page->html, rest, text);
         rest += text;
-        const char *slug = at < page->heading_count ? bytes_string(&page->headings[at].slug) : "";
-        if (rest[0] == '<' && rest[1] == 'h' && rest[2] >= '1' && rest[2] <= '6') {
-            bytes_format(&page->html, "<h%c id=\"%s\">", rest[2], slug);
-            rest += 4;
-        } else if (strncmp(rest, "</h", 3) == 0 && rest[3] >= '2' && rest[3] <= '6') {
-            bytes_format(&page->html, " <a class=\"anchor\" href=\"#%s\" aria-label=\"Link to ",
-                         slug);
-            bytes_html(&page->html, bytes_string(&page->headings[at].text));
-            bytes_format(&page->html, "\">#</a></h%c>", rest[3]);
-            rest += 5;
-            at++;
-        } else if (strncmp(rest, "</h1>", 5) == 0) {
-            bytes_put(&page->html, rest, 5);
-            rest += 5;
-            at++;
-        } else if (strncmp(rest, "<table>", 7) == 0) {
-            bytes_text(&page->html, "<div class=\"scroll\" tabindex=\"0\"><table>");
-            rest += 7;
-        } else if (strncmp(rest, "</table>", 8) == 0) {
-            bytes_text(&page->html, "</table></div>");
-            rest += 8;
-        } else if (strncmp(rest, "<pre>", 5) == 0) {
-            bytes_text(&page->html, "<pre tabindex=\"0\">");
-            rest += 5;
+        const bool is_end = strncmp(rest, "</h", 3) == 0;
+        const char level = *rest == '\0'    ? '\0'
+                           : is_end         ? rest[3]
+                           : rest[1] == 'h' ? rest[2]
+                                            : '\0';
+        if (level >= '1' && level <= '6' && !is_end) {
+            bytes_format(&page->html, "<h%c id=\"%s\">", level, bytes_string(&heading->slug));
+            rest += strlen("<h1>");
+        } else if (level >= '1' && level <= '6') {
+            if (level > '1')
+                page_put_anchor(heading, &page->html);
+            bytes_format(&page->html, "</h%c>", level);
+            rest += strlen("</h1>");
+            heading += heading + 1 < page->headings + GUIDE_HEADINGS;
         } else if (*rest != '\0') {
-            bytes_put(&page->html, rest++, 1);
+            size_t i = 0;
+            while (strncmp(rest, tags[i][0], strlen(tags[i][0])) != 0)
+                i++;
+            bytes_text(&page->html, tags[i][1]);
+            rest += strlen(tags[i][0]);
         }
     }
 }
@@ -417,7 +408,7 @@ static void page_put_link(const GuidePage *page, const char *attributes, Bytes *
     const bool is_index = strcmp(page->name, "index") == 0;
     bytes_format(bytes, "<a href=\"%s%s\"%s>", is_index ? "./" : page->name,
                  is_index ? "" : ".html", attributes);
-    bytes_html(bytes, page_title(page));
+    chart_escape(bytes, page_title(page));
     bytes_text(bytes, "</a>");
 }
 
@@ -427,7 +418,7 @@ static void page_put_pages(const GuidePage *page, Bytes *bytes) {
         const GuidePage *other = guide.pages[i];
         if (strcmp(other->group, group) != 0) {
             bytes_text(bytes, i > 0 ? "</ul>\n<h2>" : "<h2>");
-            bytes_html(bytes, other->group);
+            chart_escape(bytes, other->group);
             bytes_text(bytes, "</h2>\n<ul>\n");
             group = other->group;
         }
@@ -451,7 +442,7 @@ static void page_put_contents(const GuidePage *page, Bytes *bytes) {
             continue;
         bytes_format(bytes, "<li class=\"level%d\"><a href=\"#%s\">", heading->level,
                      bytes_string(&heading->slug));
-        bytes_html(bytes, bytes_string(&heading->text));
+        chart_escape(bytes, bytes_string(&heading->text));
         bytes_text(bytes, "</a></li>\n");
     }
     bytes_text(bytes, "</ul>");
@@ -462,9 +453,9 @@ static void page_put(const GuidePage *page, const char *name, Bytes *bytes) {
     while (guide.pages[at] != page)
         at++;
     if (strcmp(name, "title") == 0)
-        bytes_html(bytes, page_title(page));
+        chart_escape(bytes, page_title(page));
     else if (strcmp(name, "purpose") == 0)
-        bytes_html(bytes, bytes_string(&page->purpose));
+        chart_escape(bytes, bytes_string(&page->purpose));
     else if (strcmp(name, "text") == 0)
         bytes_text(bytes, bytes_string(&page->html));
     else if (strcmp(name, "pages") == 0)
