@@ -455,7 +455,7 @@ static const Field watch_fields[] = {
     FIELD_FLAG(ClientSettings, json, false, "print the finished job as JSON instead of lines"),
     FIELD_END,
 };
-static const Field cancel_fields[] = {
+static const Field server_fields[] = {
     CLIENT_ROWS,
     FIELD_END,
 };
@@ -469,10 +469,6 @@ static const Field jobs_fields[] = {
     FIELD_FLAG(ClientSettings, json, false, "print the answer of the server as JSON"),
     FIELD_END,
 };
-static const Field open_fields[] = {
-    CLIENT_ROWS,
-    FIELD_END,
-};
 static const Field compare_fields[] = {
     CLIENT_ROWS,
     FIELD_REAL(ClientSettings, wait, "s", AT_MIN(0), 60, "how long to wait for an unfinished job and a busy server"),
@@ -480,6 +476,9 @@ static const Field compare_fields[] = {
     FIELD_END,
 };
 // clang-format on
+
+// The members of a command that all of these have alike.
+#define JOBS_OPTIONS(fields) .options = fields, .size = sizeof(JobsSettings), .run = api_command
 
 const Command command_submit = {
     .name = "submit",
@@ -499,9 +498,7 @@ const Command command_submit = {
             "waiting, not the job; \"impactd cancel\" stops the job. Exit code 3 if the scene\n"
             "has faults, 1 if the job failed, 7 if the server does not answer or is busy, 8\n"
             "if the job has not finished after --wait.\n",
-    .options = submit_fields,
-    .size = sizeof(JobsSettings),
-    .run = api_command,
+    JOBS_OPTIONS(submit_fields),
     .actions = &(const ApiAction){.takes = "one scene", .operands = "f", .act = submit_act},
 };
 
@@ -514,9 +511,7 @@ const Command command_jobs = {
             "  impactd jobs --json\n"
             "\n"
             "The column \"time\" has the duration of the run, or the progress of a running job.\n",
-    .options = jobs_fields,
-    .size = sizeof(JobsSettings),
-    .run = api_command,
+    JOBS_OPTIONS(jobs_fields),
     .actions =
         &(const ApiAction){
             .takes = "no operands", .operands = "", .act = jobs_act, .query = "status q"},
@@ -531,9 +526,7 @@ const Command command_open = {
             "  impactd open r-91c0                         # a result\n"
             "\n"
             "Prints the address. Without a graphical display nothing is opened.\n",
-    .options = open_fields,
-    .size = sizeof(JobsSettings),
-    .run = api_command,
+    JOBS_OPTIONS(server_fields),
     .actions = &(const ApiAction){.takes = "the id of a job or a result, like j-7f3a, or nothing",
                                   .operands = "?i",
                                   .act = open_act},
@@ -550,9 +543,7 @@ const Command command_watch = {
             "Exit code 0 if the job was successful, 1 if it failed or was dismissed, 4 if it\n"
             "does not exist, 8 if it has not finished after --wait. Ctrl-C stops the\n"
             "watching, not the job (130). A restart of the server does not end it.\n",
-    .options = watch_fields,
-    .size = sizeof(JobsSettings),
-    .run = api_command,
+    JOBS_OPTIONS(watch_fields),
     .actions =
         &(const ApiAction){.takes = "one job's id, like j-7f3a", .operands = "i", .act = watch_act},
 };
@@ -576,9 +567,7 @@ const Command command_get = {
             "optimum, fragility. Formats: json, csv, npy, npz, mat, zip, svg; not every part\n"
             "has all of them. A file is written completely or not at all. Exit code 4 if\n"
             "there is no such part, 8 if the job has not finished after --wait.\n",
-    .options = get_fields,
-    .size = sizeof(JobsSettings),
-    .run = api_command,
+    JOBS_OPTIONS(get_fields),
     .actions =
         &(const ApiAction){.takes = "the id of a result or a job, like r-91c0, and a part of it",
                            .operands = "i?p",
@@ -592,9 +581,7 @@ const Command command_cancel = {
     .help = "  impactd cancel j-7f3a\n"
             "\n"
             "Exit code 1 if the job had finished before, 4 if it does not exist.\n",
-    .options = cancel_fields,
-    .size = sizeof(JobsSettings),
-    .run = api_command,
+    JOBS_OPTIONS(server_fields),
     .actions = &(const ApiAction){.takes = "one job's id, like j-7f3a",
                                   .operands = "i",
                                   .act = cancel_act,
@@ -610,9 +597,7 @@ const Command command_compare = {
             "  impactd compare j-7f3a j-81dd --json        # results of two jobs, as JSON\n"
             "\n"
             "Exit code 4 if one of them does not exist.\n",
-    .options = compare_fields,
-    .size = sizeof(JobsSettings),
-    .run = api_command,
+    JOBS_OPTIONS(compare_fields),
     .actions = &(const ApiAction){.takes = "the ids of two results or jobs, like r-91c0",
                                   .operands = "ii",
                                   .act = compare_act},

@@ -14,7 +14,7 @@
 #include "server/http/reply.h"
 #include "server/util/embedded.h"
 
-enum { COLUMNS_MIN = 40, COLUMNS_MAX = 120, NOTES_SHOWN = 4, TITLE_LEVEL = 1 };
+enum { COLUMNS_MIN = 40, COLUMNS_MAX = 120, NOTES_SHOWN = 4 };
 
 void report_clear(Report *report) {
     free(report->title);

@@ -151,39 +151,23 @@ static void list_add(Report *report, const Field *fields, const void *of, const 
 
 // --- run ---
 
-// Appends "; it lowers the rms displacement by 30.8 % and ..." for the reductions with this sign,
-// 0: about none.
-static void effect_put(Bytes *text, const Reduction *reduction, int sign, bool is_one) {
+// "The damper lowers the rms displacement by 30.8 %, raises ...": of what changes by 0.05 % or
+// more.
+static void run_add_effect(Report *report, const Reduction *reduction, bool is_one) {
     static const char *const names[] = {"peak displacement", "rms displacement",
                                         "peak acceleration", "rms acceleration"};
-    static const char *const verbs[] = {"raise", "leave", "lower"};
     const double of[] = {
         reduction->peak_displacement_reduction, reduction->rms_displacement_reduction,
         reduction->peak_acceleration_reduction, reduction->rms_acceleration_reduction};
-    size_t which[COUNT(of)], count = 0;
-    for (size_t i = 0; i < COUNT(of); i++)
-        if (!isnan(of[i]) && (of[i] > 5e-4) - (of[i] < -5e-4) == sign)
-            which[count++] = i;
-    if (count == 0)
-        return;
-    bytes_format(text, "%s %s%s ",
-                 text->count == 0 ? is_one ? "The damper" : "The dampers"
-                 : is_one         ? "; it"
-                                  : "; they",
-                 verbs[sign + 1], is_one ? "s" : "");
-    for (size_t k = 0; k < count; k++) {
-        const double part = of[which[k]];
-        bytes_format(text, "%sthe %s",
-                     k == 0          ? ""
-                     : k + 1 < count ? ", "
-                                     : " and ",
-                     names[which[k]]);
-        if (part < -9)
-            bytes_format(text, " to %.3g times", 1 - part);
-        else if (sign != 0)
-            bytes_format(text, " by %.3g %%", 100 * fabs(part));
+    char text[400] = "", one[80];
+    for (size_t i = 0; i < COUNT(of); i++) {
+        snprintf(one, sizeof one, "%s%s the %s by %.3g %%", of[i] > 0 ? "lower" : "raise",
+                 is_one ? "s" : "", names[i], 100 * fabs(of[i]));
+        if (fabs(of[i]) > 5e-4)
+            text_list(text, sizeof text, one);
     }
-    bytes_text(text, sign != 0 ? "" : count > 1 ? " as they are" : " as it is");
+    if (text[0] != '\0')
+        report_sentence(report, "The damper%s %s.", is_one ? "" : "s", text);
 }
 
 // The numbers of the summary, beside those without dampers where they are known.
@@ -328,11 +312,8 @@ static void run_add_details(Report *report, const Simulation *simulation, const 
                           FIELD_END};
     const Impacts first = {impacts->at,
                            impacts->count < IMPACTS_SHOWN ? impacts->count : IMPACTS_SHOWN};
-    const Impacts one = {(Impact *)(uintptr_t)largest, largest != NULL};
     list_add(report, rows, &first,
              &(ReportList){"impacts", "First impacts", impact_columns, NULL, true, 0});
-    list_add(report, rows, &one,
-             &(ReportList){"impacts", "Largest impact", impact_columns, NULL, true, 0});
     list_add(report, plan_report_fields, &outcome->plan,
              &(ReportList){"decisions", "Decisions of the plan", "about|chose|value|unit|why", NULL,
                            true, 0});
@@ -345,18 +326,11 @@ void report_of_run(Report *report, const Simulation *simulation, const Outcome *
                    double seconds) {
     const Scene *scene = &simulation->scene;
     char took[32];
-    Bytes effect = {0};
     report_sentence(report, "%.6g s at %.6g Hz, contact model %s, solver %s, computed in %s.",
                     scene->duration, scene->sample_rate, outcome->plan.contact_model,
                     outcome->plan.solver, report_seconds(took, seconds));
-    for (int sign = 1; sign >= -1 && outcome->has_reduction; sign -= sign == 1 ? 2 : -1) {
-        effect_put(&effect, &outcome->reduction, sign, scene->dampers.count == 1);
-        if (sign == 0)
-            break;
-    }
-    if (effect.count > 0)
-        report_sentence(report, "%s.", effect.at);
-    bytes_clear(&effect);
+    if (outcome->has_reduction)
+        run_add_effect(report, &outcome->reduction, scene->dampers.count == 1);
     run_add_numbers(report, outcome);
     run_add_facts(report, outcome, scene->duration);
     list_add(report, plan_report_fields, &outcome->plan,

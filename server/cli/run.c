@@ -70,10 +70,9 @@ typedef struct RunSettings {
     const TableFormat *format; // of the output's extension; NULL without output, or for a page
 } RunSettings;
 
+// clang-format off
 static const Field run_fields[] = {
-    FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0,
-               "write to this file; the extension is the format: .json, .csv, .npy, .npz, .mat, "
-               ".svg, .html"),
+    FIELD_TEXT(RunSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file; the extension is the format: .json, .csv, .npy, .npz, .mat, .svg, .html"),
     FIELD_FLAG(RunSettings, json, false, "print the finished job as JSON, also on a terminal"),
     SET_ROW(RunSettings),
     VARY_ROW(RunSettings),
@@ -81,6 +80,7 @@ static const Field run_fields[] = {
     CPU_ROW(RunSettings),
     FIELD_END,
 };
+// clang-format on
 
 // A table of the outcome, without the line feed of a document if it is `inside` another one.
 static Status table_write(Outcome *outcome, const TableFormat *format, bool inside,
@@ -605,24 +605,21 @@ const Command command_study = {
 };
 
 // Ranges and defaults are the study's own.
+// clang-format off
 static const Field tradeoff_fields[] = {
     OUTPUT_ROW(".json, a table; .svg, a chart;"),
     JSON_ROW,
-    FIELD_REAL(StudySettings, error, NULL, ANY, OPTIONAL,
-               "largest acceptable error, in the unit of the metric (1e-3)"),
-    FIELD_CHOICE(StudySettings, metric, metric_names, OPTIONAL,
-                 "displacement, mean_acceleration, peak_force, impacts, psd or rms_displacement"),
-    FIELD_COUNT(StudySettings, repeats, NULL, AT_MIN(0), OPTIONAL,
-                "number of timings of each point (5)"),
-    FIELD_TEXTS(StudySettings, solver, NULL, NULL, SOLVERS_MAX, PRESENCE_OPTIONAL, 0,
-                "compare only this solver; repeatable"),
-    FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL,
-               "skip points that are predicted to need more solver steps (5e7)"),
+    FIELD_REAL(StudySettings, error, NULL, ANY, OPTIONAL, "largest acceptable error, in the unit of the metric (1e-3)"),
+    FIELD_CHOICE(StudySettings, metric, metric_names, OPTIONAL, "displacement, mean_acceleration, peak_force, impacts, psd or rms_displacement"),
+    FIELD_COUNT(StudySettings, repeats, NULL, AT_MIN(0), OPTIONAL, "number of timings of each point (5)"),
+    FIELD_TEXTS(StudySettings, solver, NULL, NULL, SOLVERS_MAX, PRESENCE_OPTIONAL, 0, "compare only this solver; repeatable"),
+    FIELD_REAL(StudySettings, point_steps, NULL, ANY, OPTIONAL, "skip points that are predicted to need more solver steps (5e7)"),
     SET_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
     STUDY_CPU_ROW,
     FIELD_END,
 };
+// clang-format on
 
 static void tradeoff_choose(void *asked, StudySettings *settings) {
     TradeoffStudy *study = (TradeoffStudy *)(void *)asked;
@@ -662,25 +659,20 @@ const Command command_tradeoff = {
 };
 
 // Ranges and defaults are the study's own.
+// clang-format off
 static const Field ensemble_fields[] = {
     OUTPUT_ROW(".json, complete; .csv or .npz, all runs; .svg, a chart;"),
     JSON_ROW,
-    FIELD_COUNT(StudySettings, runs, NULL, AT_MIN(0), OPTIONAL,
-                "number of runs; with --target the largest number (64)"),
-    FIELD_COUNT(StudySettings, first_seed, NULL, AT_MIN(0), OPTIONAL,
-                "seed of the first run (that of the scene)"),
-    FIELD_REAL(StudySettings, target, NULL, ANY, OPTIONAL,
-               "stop when the mean of the metric is known to this relative error"),
-    FIELD_CHOICE(
-        StudySettings, metric, statistics_metric_names, OPTIONAL,
-        "peak_displacement, rms_displacement (default), peak_acceleration, "
-        "rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear "
-        "or psd"),
+    FIELD_COUNT(StudySettings, runs, NULL, AT_MIN(0), OPTIONAL, "number of runs; with --target the largest number (64)"),
+    FIELD_COUNT(StudySettings, first_seed, NULL, AT_MIN(0), OPTIONAL, "seed of the first run (that of the scene)"),
+    FIELD_REAL(StudySettings, target, NULL, ANY, OPTIONAL, "stop when the mean of the metric is known to this relative error"),
+    FIELD_CHOICE(StudySettings, metric, statistics_metric_names, OPTIONAL, "peak_displacement, rms_displacement (default), peak_acceleration, rms_acceleration, impacts, peak_contact_force, peak_storey_drift, peak_base_shear or psd"),
     SET_ROW(StudySettings),
     RECORD_ROWS(StudySettings),
     STUDY_CPU_ROW,
     FIELD_END,
 };
+// clang-format on
 
 static void ensemble_choose(void *asked, StudySettings *settings) {
     EnsembleStudy *study = (EnsembleStudy *)(void *)asked;
