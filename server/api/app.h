@@ -56,6 +56,9 @@ Handler client_files_list, client_files_show;
 // that use these tables. NULL: none.
 extern const EmbeddedFile *guide_files;
 
+// The content type of an embedded file, by its extension; NULL: unknown. landing.c.
+const char *asset_type(const char *path);
+
 // The table of a ground motion in the body, records.c. Cleared by ground_motion_text_clear.
 Status records_read_motion(const Request *request, const GroundMotionOptions *options,
                            GroundMotionText *motion, Problem *problem);

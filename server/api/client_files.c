@@ -10,14 +10,6 @@
 
 static const char client_files_folder[] = "web/client/";
 
-static const struct {
-    const char *extension, *content_type;
-} types[] = {
-    {".py", "text/x-python; charset=utf-8"},
-    {".m", "text/x-matlab; charset=utf-8"},
-    {".ipynb", "application/x-ipynb+json"},
-};
-
 // What describes a wheel, with the version of the program in place of %s.
 static const struct {
     const char *name, *format;
@@ -92,11 +84,9 @@ static Status wheel_write(Bytes *wheel, Problem *problem) {
 Status client_files_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     char name[64], path[128];
     snprintf(path, sizeof path, "%s%.100s", client_files_folder, request->parameters[0]);
-    const char *extension = strrchr(path, '.');
     const EmbeddedFile *file = embedded_find(embedded_client, path);
-    for (size_t i = 0; file != NULL && extension != NULL && i < COUNT(types); i++)
-        if (strcmp(extension, types[i].extension) == 0)
-            return reply_embedded(reply, request, file, types[i].content_type);
+    if (file != NULL)
+        return reply_embedded(reply, request, file, asset_type(path));
     wheel_name(name);
     if (strcmp(request->parameters[0], name) != 0)
         return problem_set(problem, STATUS_NOT_FOUND,

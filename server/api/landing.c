@@ -53,9 +53,12 @@ static const struct {
     {".json", type_json},
     {".svg", "image/svg+xml"},
     {".png", "image/png"},
+    {".py", "text/x-python; charset=utf-8"},
+    {".m", "text/x-matlab; charset=utf-8"},
+    {".ipynb", "application/x-ipynb+json"},
 };
 
-static const char *asset_type(const char *path) {
+const char *asset_type(const char *path) {
     const char *extension = strrchr(path, '.');
     for (size_t i = 0; extension != NULL && i < COUNT(types); i++)
         if (strcmp(extension, types[i].extension) == 0)
