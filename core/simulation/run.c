@@ -8,7 +8,7 @@
 #include "core/simulation/internal.h"
 #include "core/solve/cycle_flow.h"
 
-const char engine_version[] = "impactd-7";
+const char engine_version[] = "impactd-8";
 
 // clang-format off
 const Field summary_fields[] = {
