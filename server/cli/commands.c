@@ -91,8 +91,11 @@ static int cite_run(const Command *self, void *settings, const Options *options,
                program_version, engine_version);
     else
         printf("@software{impactd,\n"
-               "  title   = {impactd: simulation of structures with impact dampers},\n"
-               "  version = {%s, engine %s}\n"
+               "  author  = {{The impactd developers}},\n"
+               "  title   = {{impactd}: simulation of structures with impact dampers},\n"
+               "  year    = {2026},\n"
+               "  version = {%s},\n"
+               "  note    = {engine %s}\n"
                "}\n"
                "@article{LiDarby2009,\n"
                "  author  = {Li, Kuinian and Darby, Antony P.},\n"

@@ -68,6 +68,9 @@ def test_examples_and_citations():
         code, out, _ = program.run("cite", *option)
         assert code == 0 and version in out and "10.1002/stc.238" in out and "Darby" in out, out
     assert out.count("{") == out.count("}") and out.count("\n@") == 1, out
+    software = out.split("\n}\n")[0]
+    assert re.findall(r"^  (\w+) +=", software, re.M) == ["author", "title", "year", "version", "note"], out
+    assert f"version = {{{version}}}," in software and "author  = {{" in software, out
 
 
 def test_set_gives_members_other_values_with_units():
