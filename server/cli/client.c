@@ -20,6 +20,7 @@
 #include "server/api/app.h"
 #include "server/cli/files.h"
 #include "server/cli/report.h"
+#include "server/db/records.h"
 #include "server/util/clock.h"
 
 enum {
@@ -645,17 +646,20 @@ Status api_print_tables(ApiCall *call, Problem *problem) {
     return STATUS_OK;
 }
 
-void api_print_members(const Command *self, void *settings, const char *path, const char *list,
-                       const char *const *names) {
+void api_print_names(const Command *self, void *settings, const char *path, const char *list,
+                     const char *const *members, Problem *problem) {
     ApiCall call = {.command = self, .settings = settings, .answer_ms = 300};
     const JsonDocument *item;
-    if (api_open(&call, NULL) == STATUS_OK &&
-        api_get(&call, api_path("%s", path), NULL) == STATUS_OK) {
+    if (api_open(&call, problem) == STATUS_OK &&
+        api_get(&call, api_path("%s", path), problem) == STATUS_OK) {
         (void)api_reply(&call);
         for (size_t i = 0; (item = json_get_item(call.reply, list, i)) != NULL; i++)
-            for (const char *const *name = names; *name != NULL; name++)
-                if (json_get_text(item, *name) != NULL)
-                    puts(json_get_text(item, *name));
+            for (const char *const *member = members; *member != NULL; member++) {
+                const char *name = json_get_text(item, *member);
+                if (name != NULL && name[0] != '-' &&
+                    (api_is_id(name) || record_name_is_sound(name))) // slugs are ids
+                    puts(name);
+            }
     }
     api_close(&call);
 }

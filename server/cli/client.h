@@ -88,10 +88,10 @@ int api_command(const Command *self, void *settings, const Options *options, Pro
 
 // The letter of an operand of an action; '\0' if it takes fewer.
 char api_operand_kind(const ApiAction *action, size_t index);
-// For completion: prints members of the objects of the list in the answer to `path`; nothing
-// without an answer in 0.3 s. `names` ends with NULL.
-void api_print_members(const Command *self, void *settings, const char *path, const char *list,
-                       const char *const *names);
+// For completion: prints the names in members of the objects of the list in the answer to `path`;
+// no other text, and nothing without an answer in 0.3 s. `members` ends with NULL.
+void api_print_names(const Command *self, void *settings, const char *path, const char *list,
+                     const char *const *members, Problem *problem);
 
 // Prepares the call of the settings; connects to nothing yet. From here on Ctrl-C ends the program
 // with 130. STATUS_USAGE says what is wrong with the URL or the token. api_close in any case.

@@ -135,10 +135,9 @@ static int complete_run(const Command *self, void *settings, const Options *opti
                 {"records", "/v1/records?limit=500", "records", {"name", NULL}}};
     const char *kind = options->operand_count > 0 ? options->operands[0] : "";
     char name[EXAMPLE_NAME];
-    (void)problem;
     for (size_t i = 0; i < COUNT(rows); i++)
         if (strcmp(kind, rows[i].kind) == 0)
-            api_print_members(self, settings, rows[i].path, rows[i].list, rows[i].names);
+            api_print_names(self, settings, rows[i].path, rows[i].list, rows[i].names, problem);
     for (const EmbeddedFile *file = embedded_examples; file->path != NULL; file++)
         if (strcmp(kind, "examples") == 0)
             puts(example_name(file, name));

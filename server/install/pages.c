@@ -339,7 +339,8 @@ static void completion_command(FILE *file, const Command *command) {
 }
 
 // In bash, and in zsh after bashcompinit. The first pass over the words before the cursor counts
-// operands: it needs to know which options take a value.
+// operands: it needs to know which options take a value. Words may come from a server that is not
+// trusted: they are never expanded (`compgen -W` would), and are quoted for the command line.
 static void completion_bash(FILE *file) {
     fputs("# bash completion of impactd, printed from its tables.\n"
           "_impactd_command() {\n"
@@ -371,10 +372,10 @@ static void completion_bash(FILE *file) {
           "    case $kind in\n"
           "    '' | value) ;;\n"
           "    file) return ;;\n"
-          "    file.*) local IFS=$'\\n'\n"
-          "        COMPREPLY=($(compgen -f -X \"!*.${kind#file.}\" -- \"$cur\"\n"
-          "            compgen -d -S / -- \"$cur\"))\n"
-          "        compopt -o nospace 2>/dev/null\n"
+          "    file.*) while IFS= read -r word; do COMPREPLY+=(\"$word\"); done < <(\n"
+          "            compgen -f -X \"!*.${kind#file.}\" -- \"$cur\"\n"
+          "            compgen -d -S / -- \"$cur\")\n"
+          "        compopt -o filenames 2>/dev/null\n"
           "        return ;;\n"
           "    parts) words='",
           file);
@@ -384,7 +385,10 @@ static void completion_bash(FILE *file) {
     fputs("\" ;;\n"
           "    *) words=$(\"${COMP_WORDS[0]}\" complete \"$kind\" 2>/dev/null) ;;\n"
           "    esac\n"
-          "    COMPREPLY=($(compgen -W \"$words\" -- \"$cur\"))\n"
+          "    while IFS= read -r word; do\n"
+          "        [ -z \"$word\" ] || [ \"${word:0:${#cur}}\" != \"$cur\" ] ||\n"
+          "            COMPREPLY+=(\"$(printf %q \"$word\")\")\n"
+          "    done < <(printf '%s\\n' \"$words\" | tr ' ' '\\n')\n"
           "}\n"
           "complete -o default -F _impactd impactd\n",
           file);

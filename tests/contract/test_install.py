@@ -13,6 +13,7 @@ import time
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import package  # noqa: E402
 import program  # noqa: E402
+from client import client, fake, raw, say  # noqa: E402
 from package import need  # noqa: E402
 
 MANUALS = ("man1/impactd.1", "man5/impactd-scene.5", "man8/impactd.service.8")
@@ -129,6 +130,40 @@ def test_bash_completes_commands_options_and_values():
         assert set(complete(script, "help", "")) == set(known)
         bound = subprocess.run(["bash", "-c", f'source "{script}"; complete -p impactd'], capture_output=True, text=True, check=True)
         assert "-o default" in bound.stdout and "_impactd" in bound.stdout, bound
+
+
+def test_completion_runs_nothing_that_a_server_sends():
+    """Names of a server that are none are not offered; no text of a server is expanded, as command or as pattern."""
+    with installed() as root, tempfile.TemporaryDirectory() as folder:
+        script = os.path.join(root, "opt/x/share/bash-completion/completions/impactd")
+        mark = os.path.join(folder, "mark")
+        bad = [f"$(touch {mark})", f"`touch${{IFS}}{mark}`", "a;b", "*", "[a-z]*", "~", "a b", "-x", "\x1b[2Jx", "a\nb", "", 1, None]
+        lists = {"jobs": [{"id": name, "result": name} for name in [*bad, "j-1"]],
+                 "materials": [{"slug": name} for name in [*bad, "felt"]], "records": [{"name": name} for name in [*bad, "kobe.1"]]}
+        with fake(say(body=json.dumps(lists).encode())) as (url, _):
+            os.environ["IMPACTD_SERVER"] = url
+            assert complete(script, "watch", "") == ["j-1", "j-1"] and complete(script, "watch", "$") == []
+            assert complete(script, "materials", "show", "") == ["felt"] and complete(script, "records", "show", "k") == ["kobe.1"]
+        for answer in (say(503, b'{"title": "busy"}'), say(422, b'{"errors": [{}]}'), say(404, b""), say(body=b"[[["), raw(b"x")):
+            with fake(answer) as (url, _):
+                for kind in ("ids", "materials", "records"):
+                    assert client(url, "complete", kind) == (0, "", ""), kind
+        del os.environ["IMPACTD_SERVER"]
+        other = os.path.join(folder, "impactd")  # the script alone trusts no program either
+        with open(other, "w", encoding="utf-8") as file:
+            file.write("#!/bin/sh\ncat <<'E'\n" + "\n".join(str(name) for name in bad[:5]) + "\nE\n")
+        os.chmod(other, 0o755)
+        text = f'source "{script}"; COMP_WORDS=("{other}" watch ""); COMP_CWORD=2; _impactd; printf "%s\\n" "${{COMPREPLY[@]}}"'
+        done = subprocess.run(["bash", "-c", text], capture_output=True, text=True, check=True, cwd=program.EXAMPLES)
+        assert "\\$\\(touch" in done.stdout and "\\*" in done.stdout.splitlines() and ".json" not in done.stdout, done
+        assert not os.path.exists(mark)
+        odd = os.path.join(folder, "*.json")
+        for name in ("*.json", "a b.json", "c.json"):
+            with open(os.path.join(folder, name), "w", encoding="utf-8"):
+                pass
+        text = f'source "{script}"; COMP_WORDS=(x run "{folder}/"); COMP_CWORD=2; _impactd; printf "%s\\n" "${{COMPREPLY[@]}}"'
+        done = subprocess.run(["bash", "-c", text], capture_output=True, text=True, check=True)
+        assert sorted(done.stdout.splitlines()) == [odd, os.path.join(folder, "a b.json"), os.path.join(folder, "c.json")], done
 
 
 def test_the_unit_is_well_formed_and_shut_off():
