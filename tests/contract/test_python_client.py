@@ -11,7 +11,9 @@ import subprocess
 import sys
 import tempfile
 import threading
+import traceback
 import unittest.mock
+import warnings
 import zipfile
 
 import matplotlib
@@ -267,7 +269,8 @@ def test_jobs_can_be_waited_for_and_cancelled():
         assert states == {"dismissed", "successful"}, states
         job = next(lab.job(one) for one in lab.jobs(status="running")["id"])
         assert job.cancel().status == "dismissed" and job.cancel().status == "dismissed"
-        assert refused(job.result).job is job
+        problem = refused(job.result)
+        assert problem.job is job and problem.type == "/problems/cancelled", problem
 
 
 def test_interrupts_cancel_where_that_was_asked_for():
@@ -313,6 +316,49 @@ def test_requests_are_repeated_where_that_is_safe():
         lab.request("GET", "/base/v1/cache")
         lab.request("GET", "http://elsewhere.example/base/v1/cache")  # a link never leads to another host
         assert [line[1] for line in seen] == ["/base/version"] + ["/base/v1/cache"] * 3
+
+
+def test_tokens_and_passwords_stay_secret():
+    """A token's line end is removed, a wrong token or an address with a password is refused, and no message shows either."""
+    with fake(say(body=b'{"version": "x"}')) as (url, seen):
+        lab = impactd.connect(url, " s3cret-token\r\n")
+        assert seen[0][2]["Authorization"] == "Bearer s3cret-token" and "s3cret" not in repr(lab)
+        for wrong in ("s3cret\nX: y", "s3cr\u00e9t", "s3cret token", "s3cret" * 100, b"s3cret"):
+            error = raised(ValueError, impactd.connect, url, wrong)
+            assert "s3cr" not in "".join(traceback.format_exception(None, error, None)), error
+        host = url.split("//")[1]
+        for wrong in (f"http://user:s3cret@{host}", f"user:s3cret@{host}", "http://user:s3cret/x@h", f"{url}?key=s3cret", f"{url}#s3cret"):
+            error = raised(ValueError, impactd.connect, wrong)
+            assert "s3cr" not in "".join(traceback.format_exception(None, error, None)) and "password" in str(error), error
+        for wrong in ("", "x\r\ny", "http://h:99999", "ftp://h", "http://[::1", "http://a b"):
+            raised(ValueError, impactd._address, wrong)
+        assert len(seen) == 1
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for address in ("http://127.0.0.2:1", "http://[::1]:1", "http://localhost", "https://h.example", "http://127.evil.example"):
+            impactd._Http(address, "s3cret", None, 1, 1)
+    assert [str(one.message) for one in caught] == ["the token is sent to 127.evil.example without encryption; use https"]
+
+
+def test_mistakes_of_the_caller_are_named():
+    """Wrong scenes, indices and documents raise ValueError or TypeError with what is wrong; texts from the server stay on their line."""
+    with laboratory() as lab, tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+        for wrong in (5, None, b"x", ["paper_free_sponge"]):
+            assert "a scene is a dict" in str(raised(TypeError, lab.run, wrong))
+        assert "empty string" in str(raised(ValueError, lab.run, ""))
+        file.write("root:x:0")
+        file.flush()
+        assert file.name in str(raised(ValueError, lab.run, file.name))
+        for index in ("\u00b2", "\u0660", "-1", "0\n", "9" * 5000):
+            assert refused(lab.scene, "paper_free_sponge", **{f"dampers.{index}.clearance": 1}).faults[0].pointer.startswith("/dampers/")
+        endless_dict = {}
+        endless_dict["a"] = endless_dict
+        assert "contains itself" in str(raised(ValueError, lab.run, {"structure": endless_dict}))
+        assert "NaN" in str(raised(ValueError, lab.run, {"duration": float("nan")}))
+        r = lab.run(short())
+        assert "in this result. It has" in str(raised(AttributeError, lambda: r.zzz))
+    problem = impactd.Problem({"title": "a\x1b[2J", "detail": "b\u202ec\n", "errors": [{"pointer": "/\x9b", "detail": "d\r"}]})
+    assert str(problem) == "a\\x1b[2J (about:blank, status 0)\n  b\\u202ec\\n\n  /\\x9b: d\\r", str(problem)
 
 
 def test_one_client_serves_many_threads():

@@ -21,6 +21,7 @@ import html
 import http.client
 import importlib
 import io
+import ipaddress
 import json
 import os
 import queue
@@ -33,6 +34,7 @@ import threading
 import time
 import urllib.parse
 import uuid
+import warnings
 from array import array
 from typing import Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence, Union
 
@@ -52,6 +54,11 @@ _RETRIES = 4        # of a request whose connection failed
 
 # --- errors ---
 
+def _clean(text: Any) -> str:
+    """A text of the server for a terminal: control characters are shown as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text))
+
+
 class Fault(NamedTuple):
     """One fault of a request: where it is (a JSON Pointer), what is wrong and what would be right."""
     pointer: str
@@ -62,7 +69,7 @@ class Fault(NamedTuple):
 
     def __str__(self) -> str:
         hint = f'; did you mean "{self.did_you_mean}"?' if self.did_you_mean else ""
-        return f"{self.pointer}: {self.detail}{hint}"
+        return _clean(f"{self.pointer}: {self.detail}{hint}")
 
 
 class Problem(Exception):
@@ -94,9 +101,9 @@ class Problem(Exception):
         super().__init__(self.title)
 
     def __str__(self) -> str:
-        lines = [f"{self.title} ({self.type}, status {self.status})"]
+        lines = [_clean(f"{self.title} ({self.type}, status {self.status})")]
         if self.detail and not any(self.detail.endswith(fault.detail) for fault in self.faults):
-            lines.append(f"  {self.detail}")
+            lines.append(f"  {_clean(self.detail)}")
         return "\n".join(lines + [f"  {fault}" for fault in self.faults])
 
 
@@ -142,7 +149,11 @@ def _plain(value: Any) -> Any:
 def _encode(document: Any) -> bytes:
     try:
         return json.dumps(document, default=_plain, allow_nan=False).encode()
+    except RecursionError:
+        raise ValueError("the document is nested too deeply, or contains itself") from None
     except ValueError as error:
+        if "Circular" in str(error):
+            raise ValueError("the document contains itself") from None
         raise ValueError("NaN and infinity cannot be sent; None is an absent value") from error
 
 
@@ -169,7 +180,7 @@ def _set(scene: Any, path: str, value: Any) -> None:
         place += "/" + step
         is_last = i + 1 == len(steps)
         if isinstance(at, list):
-            if not step.isdigit() or int(step) >= len(at):
+            if not re.fullmatch("[0-9]{1,18}", step) or int(step) >= len(at):
                 raise _fault(place, f"the list has {len(at)} items, numbered from 0; there is no item {step!r}", step)
             key: Any = int(step)
         elif isinstance(at, dict):
@@ -185,9 +196,9 @@ def _set(scene: Any, path: str, value: Any) -> None:
 
 
 def _cell(text: str) -> Any:
-    if re.fullmatch(r"-?\d+", text):
+    if re.fullmatch("-?[0-9]{1,18}", text):
         return int(text)
-    if re.fullmatch(r"-?[\d.]+(e[-+]?\d+)?|nan|-?inf", text):
+    if re.fullmatch(r"-?([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?|nan|-?inf", text):
         return float(text)
     return {"true": True, "false": False}.get(text, text)
 
@@ -270,17 +281,49 @@ class _Reply(NamedTuple):
         return json.loads(self.body)
 
 
+def _address(url: str) -> tuple[urllib.parse.SplitResult, Optional[int]]:
+    """The parts of a server's address and its port. No message shows an address that may have a password in it."""
+    if any(secret in url for secret in "@?#"):
+        raise ValueError("the address of a server has no user, password, query or fragment: https://sim.example.org/path; "
+                         "a token is an argument of its own")
+    try:
+        parts = urllib.parse.urlsplit(url if "//" in url else "http://" + url)
+        port = parts.port
+    except ValueError:
+        parts, port = None, None
+    if parts is None or parts.scheme not in ("http", "https") or not parts.hostname or not re.fullmatch(r"[^\s\x00-\x1f\x7f]+", url):
+        raise ValueError(f"{url!r} is not the address of a server, such as http://127.0.0.1:8080")
+    return parts, port
+
+
+def _token(token: Optional[str]) -> Optional[str]:
+    """The token without blanks and line ends at its ends. No message shows it."""
+    token = token.strip() if isinstance(token, str) else token
+    if not token:
+        return None
+    if not isinstance(token, str) or not re.fullmatch(r"[A-Za-z0-9._~+/=-]{1,512}", token):
+        raise ValueError("the token must be a string of 1 to 512 letters, digits and -._~+/=")
+    return token
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
 class _Http:
     """Requests to one server. Connections are reused; a thread has one of its own during a request."""
 
     def __init__(self, url: str, token: Optional[str], ca_file: Optional[str], timeout: float, patience: float):
-        parts = urllib.parse.urlsplit(url if "//" in url else "http://" + url)
-        if parts.scheme not in ("http", "https") or not parts.hostname:
-            raise ValueError(f"{url!r} is not the address of a server, such as http://127.0.0.1:8080")
+        parts, self.port = _address(url)
         self.url = f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}"
-        self.host, self.port, self.base = parts.hostname, parts.port, parts.path.rstrip("/")
+        self.host, self.base = parts.hostname or "", parts.path.rstrip("/")
         self.tls = ssl.create_default_context(cafile=ca_file) if parts.scheme == "https" else None
-        self.token, self.timeout, self.patience = token, timeout, patience
+        self.token, self.timeout, self.patience = _token(token), timeout, patience
+        if self.token and self.tls is None and not _is_loopback(self.host):
+            warnings.warn(f"the token is sent to {self.host} without encryption; use https", stacklevel=4)
         self.idle: list[http.client.HTTPConnection] = []
         self.lock = threading.Lock()
         self.is_known = False  # whether it has answered before: then it may be starting again
@@ -353,7 +396,7 @@ class _Http:
             if reply.status < 400:
                 return reply
             delay = reply.headers.get("Retry-After")
-            delay = float(delay) if delay and delay.isdigit() else None
+            delay = float(delay) if delay and re.fullmatch("[0-9]{1,9}", delay) else None
             if reply.status in (429, 503) and delay is not None and time.monotonic() + delay < end:
                 time.sleep(max(delay, 0.05) * random.uniform(1, 1.2))
                 continue
@@ -492,7 +535,7 @@ class Job:
         """Waits, and returns the Result, of a study the Study. Raises Problem where the job failed or was cancelled."""
         self.wait(timeout)
         if self.status != "successful":
-            cancelled = {"title": f"Job {self.id} is {self.status}", "type": "/problems/" + self.status}
+            cancelled = {"title": f"Job {self.id} is {self.status}", "type": "/problems/cancelled", "status": 409}
             raise Problem(self.document.get("problem") or cancelled, job=self)
         return (Study if self.document.get("study") else Result)(self._lab, self.document["result"], self.document)
 
@@ -507,7 +550,7 @@ class Job:
         return self
 
     def __repr__(self) -> str:
-        return f"<impactd.Job {self.id} {self.status}>"
+        return _clean(f"<impactd.Job {self.id} {self.status}>")
 
 
 class Spectrum(NamedTuple):
@@ -603,7 +646,7 @@ class Result:
     def _no_channel(self, name: str) -> str:
         near = difflib.get_close_matches(name, self.channels, 1)
         return (f"there is no channel {name!r} in this result" + (f"; did you mean {near[0]!r}?" if near else "")
-                + f" It has {', '.join(self.channels) or 'none'}; ask for others by output.channels of the scene")
+                + f". It has {', '.join(self.channels) or 'none'}; ask for others by output.channels of the scene")
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -756,7 +799,7 @@ class Result:
         return page + f"<img alt='chart' style='max-width:100%' src='data:image/svg+xml;base64,{chart}'>"
 
     def __repr__(self) -> str:
-        return f"<impactd.{type(self).__name__} {self.id[:10]} {self._title()!r}>"
+        return _clean(f"<impactd.{type(self).__name__} {self.id[:10]} {self._title()!r}>")
 
 
 # The part of a result with a study's answer, where it is not the kind itself.
@@ -852,7 +895,7 @@ class Study(Result):
             return self._values(self.answer["parameters"])
         best = self.answer["best"]
         if best is None:
-            raise Problem({"title": "No candidate meets the constraints", "type": "/problems/infeasible", "status": 422,
+            raise Problem({"title": "No candidate meets the constraints", "status": 422,
                            "errors": self.answer["warnings"]})
         objectives = {one["metric"]: one["value"] for one in best["objectives"]}
         return {**self._values(best["values"]), **objectives, "feasible": best["feasible"]}
@@ -925,7 +968,8 @@ class Lab:
 
     - a dict, as in the scene reference.
     - the path of a JSON file: a string that ends with ".json", or a pathlib.Path.
-    - the name of an example (`lab.examples()`), such as "paper_free_sponge".
+    - the name of an example (`lab.examples()`), such as "paper_free_sponge". A file of that name in the current
+      folder comes first.
     - a Result, whose scene is used.
 
     Keywords change the scene: `**{"dampers.0.clearance": 0.01}`, also as JSON Pointers, `"/dampers/0/clearance"`, and
@@ -954,7 +998,7 @@ class Lab:
         self.close()
 
     def __repr__(self) -> str:
-        return f"<impactd.Lab {self.url}, impactd {self.version['version']}>"
+        return _clean(f"<impactd.Lab {self.url}, impactd {self.version['version']}>")
 
     def request(self, method: str, path: str, document: Any = None) -> Any:
         """Any other call of the API: `lab.request("GET", "/v1/cache")`. Sends and returns JSON."""
@@ -966,6 +1010,17 @@ class Lab:
         """Names of the scenes that come with the server."""
         return [one["name"] for one in self._http.json("GET", "/v1/examples")["examples"]]
 
+    @staticmethod
+    def _file(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
+        with open(path, encoding="utf-8") as file:
+            try:
+                document = json.load(file)
+            except (ValueError, RecursionError) as error:
+                raise ValueError(f"{os.fspath(path)!r} is not a JSON file: {error}") from None
+        if not isinstance(document, dict):
+            raise ValueError(f"{os.fspath(path)!r} is not a scene: it must be a JSON object")
+        return document
+
     def scene(self, scene: Scene, **overrides: Any) -> dict[str, Any]:
         """The scene as a dict of its own, with overrides: what `run` sends.
 
@@ -975,9 +1030,14 @@ class Lab:
             document = scene.scene
         elif isinstance(scene, collections.abc.Mapping):
             document = scene
+        elif not isinstance(scene, (str, os.PathLike)):
+            raise TypeError("a scene is a dict, the path of a JSON file, the name of an example or a Result, "
+                            f"not a {type(scene).__name__}" + ("; submit takes lists" if isinstance(scene, list) else ""))
+        elif not scene:
+            raise ValueError("a scene is a dict, the path of a JSON file, the name of an example or a Result; "
+                             "this is an empty string")
         elif isinstance(scene, os.PathLike) or scene.endswith(".json") or os.path.isfile(scene):
-            with open(scene, encoding="utf-8") as file:
-                document = json.load(file)
+            document = self._file(scene)
         else:
             if scene not in self._examples:
                 self._examples[scene] = self._http.json("GET", f"/v1/examples/{_name(scene)}")
