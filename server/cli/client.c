@@ -508,7 +508,7 @@ void api_add_faults(const JsonDocument *document, Status status, Problem *proble
     if (problem->count > 0 && more > 0 && more < 1e9)
         problem->count += (size_t)more;
     const char *detail = json_get_text(document, "detail");
-    detail = detail != NULL ? detail : json_get_text(document, "title");
+    detail = detail != NULL && detail[0] != '\0' ? detail : json_get_text(document, "title");
     (void)problem_set(problem, status, "%s",
                       detail != NULL && detail[0] != '\0' ? detail : "no reason is given");
 }

@@ -10,6 +10,10 @@
 
 void command_print_faults(const char *name, const char *separator, const char *quote,
                           const Problem *problem) {
+    char shown[1024];
+    text_fit(shown, sizeof shown, name);
+    text_make_printable(shown);
+    name = shown;
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
         Fault fault = problem->faults[i];
         text_make_printable(fault.pointer);

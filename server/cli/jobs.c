@@ -257,7 +257,7 @@ static void jobs_add(PrintTable *table, const JsonDocument *job) {
     print_table_add(table, "%s", status != NULL ? status : "");
     age_add(table, 1e-3 * (double)(clock_unix_ms() - created_ms));
     if (status != NULL && strcmp(status, "running") == 0)
-        print_table_add(table, "%.0f %%", json_get_number(job, "progress"));
+        print_table_add(table, "%.0f %%", fmin(fmax(json_get_number(job, "progress"), 0), 100));
     else if (isnan(run))
         print_table_add(table, "%s", "");
     else

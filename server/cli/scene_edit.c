@@ -85,7 +85,10 @@ static Status scene_edit_axis(const SceneEdit *edit, const Field *row, bool is_t
     for (size_t i = 0;; i++) {
         const size_t size = strcspn(at, is_range ? ":" : ",");
         const bool is_last = at[size] == '\0';
-        snprintf(value, sizeof value, "%.*s", (int)(size < PLACE_SIZE ? size : 0), at);
+        if (size >= PLACE_SIZE)
+            return problem_add(problem, STATUS_USAGE, edit->place,
+                               "must have values of less than %d characters", (int)PLACE_SIZE);
+        snprintf(value, sizeof value, "%.*s", (int)size, at);
         if (is_range && i == COUNT(names) && is_last && strcmp(value, "log") == 0) {
             bytes_text(json, ", \"spacing\": \"logarithmic\"");
             break;

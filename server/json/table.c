@@ -19,6 +19,11 @@ void text_make_printable(char *text) {
             if (*c == 0xC2)
                 *c++ = '?'; // both bytes of a C1 control
             *c = '?';
+        } else if (c[0] == 0xE2 && ((c[1] == 0x80 && ((c[2] >= 0x8B && c[2] <= 0x8F) ||
+                                                      (c[2] >= 0xA8 && c[2] <= 0xAE))) ||
+                                    (c[1] == 0x81 && c[2] >= 0xA6 && c[2] <= 0xA9))) {
+            memset(c, '?', 3); // invisible, or changes the direction of the text
+            c += 2;
         }
 }
 

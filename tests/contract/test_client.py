@@ -450,6 +450,22 @@ def test_lists_are_printed_with_all_their_pages():
         assert code == 7 and out == "" and "no end" in errors and len(seen) == 2, (code, out, errors, seen)
 
 
+def test_hostile_text_reaches_no_terminal():
+    """Control and bidirectional characters of operands and answers are replaced; progress stays within 0 to 100 %; a title replaces an empty detail."""
+    job = {"id": "j-1", "status": "running", "progress": 1e308, "title": "a\u202eb\u2066c\u200bd\u2028e"}
+    with fake(say(body=json.dumps({"jobs": [job]}).encode())) as (url, _):
+        code, out, _ = client(url, "jobs")
+        assert code == 0 and "a???b???c???d???e" in out and " 100 %" in out, out
+    with fake(say(404, b'{"title": "gone away", "detail": ""}')) as (url, _):
+        code, _, errors = client(url, "get", "r-1")
+        assert code == 4 and "gone away" in errors, errors
+    for words in (("\x1b[31mx",), ("help", "\x1b[31mx"), ("check", "\x1b[31mx.json")):
+        code, out, errors = client(url, *words)
+        assert code != 0 and "[31mx" in errors and "\x1b" not in out + errors, (words, errors)
+    code, _, errors = client(url, "check", SPONGE, "--vary", "duration=" + "1" * 2000 + ",2")
+    assert code == 2 and "characters" in errors, errors
+
+
 def test_tls_is_verified():
     """A certificate that nobody trusts is refused with the mend; --ca-file trusts it."""
     import ssl
