@@ -43,9 +43,17 @@ let index = null, chosen = -1;
 at("guide-search").hidden = false;
 
 const plain = (text) => text.toLowerCase();
+// What people ask for, and the word of the guide.
+const SYNONYMS = [
+  [/\blicens(e|ing)\b/g, "licence"], [/\b(log-?in|passwords?|api[ -]?keys?)\b/g, "token"], [/\breverse proxy\b/g, "proxy"],
+  [/\bsse\b/g, "events"], [/\bcitations?\b/g, "cite"], [/\bhow long\b.*/g, "cost"],
+];
 // "authentication" finds "authenticate": long words are looked for without their ending.
 const stem = (word) => word.replace(/^(.{4,}?)(ations?|ions?|ing|ed|es|s|e)$/, "$1");
-const asked = () => plain(words.value).split(/\s+/).filter(Boolean).map(stem);
+const asked = () => {
+  const text = SYNONYMS.reduce((now, [from, to]) => now.replace(from, to), plain(words.value));
+  return text.split(/\s+/).map((word) => word.replace(/^[^\p{L}\p{N}_/-]+|[^\p{L}\p{N}_/]+$/gu, "")).filter(Boolean).map(stem);
+};
 async function read() {
   index ??= get("search.json").then((pages) => pages.flatMap(([page, title, sections]) => sections.map(([anchor, heading, text]) =>
     ({ weight: page === "api" ? 0.7 : 1, href: `${page === "index" ? "./" : `${page}.html`}${anchor && `#${anchor}`}`, title, heading, text, anchor,
@@ -54,24 +62,27 @@ async function read() {
   return index;
 }
 
+const escape = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
+// Words are looked for at their beginning: "sign" does not find "design".
+const begins = (...wanted) => new RegExp(`(?<![\\p{L}\\p{N}])(${wanted.map(escape).join("|")})`, "iu");
+
 // How well a section fits all words, 0 where one is missing: a heading counts more than a title, and that more than
 // the text; the reference of the API counts less than other pages.
 function score({ low, anchor, weight }, wanted) {
   let sum = 0;
   for (const word of wanted) {
-    const starts = (text) => text.startsWith(word) || text.includes(` ${word}`);
-    const one = (low.heading === word ? 60 : starts(low.heading) ? 40 : low.heading.includes(word) ? 25 : 0)
-      + (anchor && low.title.includes(word) ? 8 : 0) + (starts(low.text) ? 4 : low.text.includes(word) ? 2 : 0);
+    const start = begins(word);
+    const one = (low.heading === word ? 60 : start.test(low.heading) ? 40 : 0)
+      + (anchor && start.test(low.title) ? 8 : 0) + (start.test(low.text) ? 4 : 0);
     if (one === 0) return 0;
     sum += one;
   }
   return weight * (sum + (low.heading.includes(wanted.join(" ")) ? 30 : low.text.includes(wanted.join(" ")) ? 6 : 0) + (anchor ? 0 : 5));
 }
 
-const escape = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
-const marked = (text, wanted) => text.split(new RegExp(`(${wanted.map(escape).join("|")})`, "i")).map((part, i) => (i % 2 ? h("mark", null, part) : part));
+const marked = (text, wanted) => text.split(begins(...wanted)).map((part, i) => (i % 2 ? h("mark", null, part) : part));
 function excerpt({ text, low }, wanted) {
-  const place = Math.min(...wanted.map((word) => low.text.indexOf(word)).filter((one) => one >= 0), text.length);
+  const place = Math.min(...wanted.map((word) => low.text.search(begins(word))).filter((one) => one >= 0), text.length);
   const from = Math.max(0, place === text.length ? 0 : place - EXCERPT / 2), part = text.slice(from, from + EXCERPT);
   return `${from > 0 ? "…" : ""}${part.trim()}${from + EXCERPT < text.length ? "…" : ""}`;
 }
@@ -100,7 +111,7 @@ async function search() {
   fill(found, best.map(({ section }, i) => h("a", { role: "option", id: `guide-found-${i}`, href: section.href, tabindex: "-1", onclick: close },
     h("b", null, section.anchor ? [h("span.quiet", null, `${section.title} › `)] : [], marked(section.heading, wanted)),
     marked(excerpt(section, wanted), wanted))),
-    best.length === 0 && h("p", null, sections ? `Nothing has ${words.value.trim()}.` : "The index cannot be read; is the daemon running?"));
+    best.length === 0 && h("p", null, sections ? `Nothing has ${words.value.trim()}.` : "The index cannot be read; is the server running?"));
   found.hidden = false;
   words.ariaExpanded = "true";
   choose(0);
