@@ -264,7 +264,7 @@ TEST(an_outlier_is_told_and_counts) {
     assert_true(evaluation.rows.at[4].restitution_is_outlier);
     assert_true(evaluation.rows.at[4].restitution_counts);
     assert_near(evaluation.restitution.mean, 2.645 / 5, 1e-12);
-    assert_true(is_warned("/drops/4", "it counts"));
+    assert_true(is_warned("/drops/4", "It counts"));
     evaluation_clear(&evaluation);
     fields_clear(drop_test_fields, &test);
 }
