@@ -5,7 +5,7 @@ import { says, test, until } from "./support.mjs";
 test("The trade is measured on the scene, chosen from by keyboard, known at once to whoever opens its URL, and another scene's is called so", async ({ page: first, newPage, url }) => {
   let page = first;
   await page.goto(url("#/scene"));
-  await page.getByLabel("Duration").fill("1");
+  await page.getByLabel("Duration [s]").fill("1");
   const measure = page.getByRole("button", { name: "Measure the trade on this scene" });
   await measure.click();
   let slider = page.getByRole("slider");
@@ -33,7 +33,7 @@ test("The trade is measured on the scene, chosen from by keyboard, known at once
 
 test("A measurement is given up half way", async ({ page, daemon, url }) => {
   await page.goto(url("#/scene"));
-  await page.getByLabel("Duration").fill("21");
+  await page.getByLabel("Duration [s]").fill("21");
   await page.getByRole("button", { name: "Measure the trade on this scene" }).click();
   await page.getByRole("button", { name: "Cancel" }).click();
   await says(page.locator("main"), /nothing was measured/i);
