@@ -212,9 +212,12 @@ static void run_add_facts(Report *report, const Outcome *outcome, double duratio
     if (response->resting_count > 0)
         bytes_format(&text, ", %llu intervals of persistent contact",
                      (unsigned long long)response->resting_count);
-    if (!isnan(force) && response->impact_count > 0)
+    const bool has_force = force > 0;
+    if (response->impact_count > 0 && !has_force)
+        bytes_text(&text, ", of impulses, which have no contact force");
+    else if (!isnan(force) && response->impact_count > 0)
         bytes_format(&text, ", largest contact force %.6g N", force);
-    if (largest != NULL)
+    if (largest != NULL && has_force)
         bytes_format(&text, " at %.6g s (damper %llu, %s)", largest->start,
                      (unsigned long long)largest->damper, side_names[largest->side]);
     report_fact(table, "impacts", &text);
@@ -299,7 +302,7 @@ static void run_add_details(Report *report, const Simulation *simulation, const 
         impact_history_make(simulation, (size_t)(largest - impacts->at) + 1, IMPACT_HISTORY_POINTS,
                             NULL, NULL, NULL, &history, NULL) == STATUS_OK &&
         table_stream_columns(stream, &history.columns, true, NULL) == STATUS_OK) {
-        Chart *chart = report_chart(report, "Largest impact", 0, 0);
+        Chart *chart = report_chart(report, "Largest impact, pressing is positive", 0, 0);
         if (chart != NULL)
             chart_table(&stream->table, chart);
     }

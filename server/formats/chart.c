@@ -89,7 +89,7 @@ void chart_escape(Bytes *bytes, const char *text) {
         if (mark != NULL)
             bytes_text(bytes, entities[mark - marks]);
         else
-            bytes_put(bytes, (unsigned char)*c < ' ' ? " " : c, 1);
+            bytes_put(bytes, (unsigned char)*c < ' ' && *c != '\n' ? " " : c, 1);
     }
 }
 
