@@ -179,8 +179,10 @@ static void report_style(const ReportText *text, const char *style) {
         fprintf(text->file, "\033[%sm", style);
 }
 
-// Words with line feeds where the line ends; further lines begin with `indent` spaces.
-static void report_wrap(const ReportText *text, const char *words, size_t used, int indent) {
+// Words with line feeds where the line ends, each behind `mark`; further lines begin with `indent`
+// spaces.
+static void report_wrap_marked(const ReportText *text, const char *words, size_t used, int indent,
+                               const char *mark) {
     size_t at = used;
     for (bool is_first = true; *words != '\0'; is_first = false) {
         size_t length = strcspn(words, " "), width = 0;
@@ -188,8 +190,8 @@ static void report_wrap(const ReportText *text, const char *words, size_t used, 
             length += 1 + strcspn(words + length + 1, " ");
         for (size_t i = 0; i < length; i++)
             width += ((unsigned char)words[i] & 0xC0) != 0x80;
-        if (!is_first && at + 1 + width > text->terminal->columns) {
-            fprintf(text->file, "\n%*s", indent, "");
+        if (!is_first && at + 1 + width + strlen(mark) > text->terminal->columns) {
+            fprintf(text->file, "%s\n%*s", mark, indent, "");
             at = (size_t)indent;
         } else if (!is_first) {
             fputc(' ', text->file);
@@ -200,6 +202,10 @@ static void report_wrap(const ReportText *text, const char *words, size_t used, 
         words += length + strspn(words + length, " ");
     }
     fputc('\n', text->file);
+}
+
+static void report_wrap(const ReportText *text, const char *words, size_t used, int indent) {
+    report_wrap_marked(text, words, used, indent, "");
 }
 
 static void report_put_section(const ReportText *text, ReportSection *section) {
@@ -272,7 +278,7 @@ static void report_put(const ReportText *text, Report *report, const Texts *file
     if (report->next != NULL) {
         fputs("Next  ", text->file);
         report_style(text, "36");
-        report_wrap(text, report->next, 6, 6);
+        report_wrap_marked(text, report->next, 6, 6, " \\"); // one command when it is pasted
         report_style(text, "0");
     }
 }
