@@ -1,6 +1,7 @@
 // --set and --vary: the scene's text with other values, before it is read or sent, so that a server
 // and this program get the same scene. The Field row at a path decides what a value is.
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/base/json_pointer.h"
@@ -61,13 +62,21 @@ static Status scene_edit_value(const SceneEdit *edit, const Field *row, bool is_
         return problem_add(problem, STATUS_USAGE, edit->place, "needs a value behind \"=\"");
     if (is_json)
         bytes_text(json, value);
-    else if (!is_number)
+    else if (!is_number && (is_tag || (row->fields == NULL && row->kinds == NULL) ||
+                            !quantity_read(value, NULL, &number, reason)))
         bytes_json_string(json, value);
-    else if (quantity_read(value, unit, &number, reason))
+    else if (!is_number || quantity_read(value, unit, &number, reason))
         bytes_real(json, number);
     else
         return problem_add(problem, STATUS_USAGE, edit->place, "%s", reason);
     return STATUS_OK;
+}
+
+// Whether an end of a range has a unit: 1 or 0; -1 for zero and texts, where it does not matter.
+static int scene_edit_has_unit(const char *value) {
+    char *end;
+    const double number = strtod(value, &end);
+    return end == value || number == 0 ? -1 : *end != '\0';
 }
 
 // Appends {"pointer", "from", "to", "count", "spacing"} for "5mm:30mm:26" or "5mm:30mm:26:log",
@@ -82,6 +91,7 @@ static Status scene_edit_axis(const SceneEdit *edit, const Field *row, bool is_t
     bytes_json_string(json, edit->pointer);
     bytes_text(json, is_range ? "" : ", \"values\": [");
     const char *at = edit->value;
+    int has_unit = -1; // that of the values before
     for (size_t i = 0;; i++) {
         const size_t size = strcspn(at, is_range ? ":" : ",");
         const bool is_last = at[size] == '\0';
@@ -102,6 +112,13 @@ static Status scene_edit_axis(const SceneEdit *edit, const Field *row, bool is_t
         bytes_text(json, is_range ? names[i] : i > 0 ? ", " : "");
         TRY(scene_edit_value(edit, is_count ? &count_row : row, !is_count && is_tag,
                              is_count ? NULL : unit, value, json, problem));
+        const int marked = !is_range || is_count ? -1 : scene_edit_has_unit(value);
+        if (unit != NULL && has_unit >= 0 && marked >= 0 && marked != has_unit)
+            return problem_add(problem, STATUS_USAGE, edit->place,
+                               "must have a unit at both ends or at none: write 5mm:30mm:26, is "
+                               "%.100s",
+                               edit->value);
+        has_unit = marked >= 0 ? marked : has_unit;
         if (is_last)
             break;
         at += size + 1;
@@ -156,13 +173,30 @@ static Status scene_edit_sweep(const Bytes *axes, Bytes *text, Problem *problem)
     return status;
 }
 
+// Whether `later` is the kind or the model of the object that has the member `given`.
+static bool scene_edit_is_kind_of(const char *later, const char *given) {
+    static const char *const names[] = {"kind=", "model="};
+    size_t parent = strcspn(given, "=");
+    while (parent > 0 && strchr("./", given[parent - 1]) == NULL)
+        parent--;
+    for (size_t i = 0; i < COUNT(names) && strncmp(later, given, parent) == 0; i++)
+        if (strncmp(later + parent, names[i], strlen(names[i])) == 0)
+            return parent > 1;
+    return false;
+}
+
 Status scene_edit(const Command *self, const void *settings, Bytes *text, Problem *problem) {
     Bytes axes = {0};
     Status status = STATUS_OK;
     for (const Field *row = self->options; row != NULL && row->kind != FIELD_KIND_END; row++) {
         const bool is_vary = strcmp(row->name, "vary") == 0;
+        const bool is_edit = is_vary || strcmp(row->name, "set") == 0;
         const Texts *given = (const void *)((const char *)settings + row->offset);
-        for (size_t i = 0; (is_vary || strcmp(row->name, "set") == 0) && i < given->count; i++) {
+        for (size_t i = 0; is_edit && i < given->count; i++) {
+            // A kind decides which members there are: it is set before them, and again in its turn.
+            for (size_t k = i + 1; !is_vary && k < given->count; k++)
+                if (scene_edit_is_kind_of(given->at[k], given->at[i]))
+                    (void)scene_edit_one("--set", given->at[k], text, NULL, NULL);
             bytes_text(&axes, axes.count > 0 ? ", " : "");
             const Status one = scene_edit_one(is_vary ? "--vary" : "--set", given->at[i], text,
                                               is_vary ? &axes : NULL, problem);

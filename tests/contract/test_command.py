@@ -411,6 +411,21 @@ def test_no_file_takes_a_closed_streams_place():
             assert process.wait(20) == 0
 
 
+def test_edits_need_one_unit_and_any_order():
+    """A range has a unit at both ends or at none, kinds are set first, and a number for an object is named as a number."""
+    for value in ("5:30mm:5", "5mm:30:5"):
+        code, _, errors = program.run("sweep", SPONGE, "--vary", f"dampers.0.clearance={value}")
+        assert code == 2 and "5mm:30mm" in errors, errors
+    code, _, errors = program.run("sweep", SPONGE, "--vary", "dampers.0.clearance=10mm,20mm", "--set", "duration=1")
+    assert code == 0, errors
+    code, _, errors = program.run("check", SPONGE, "--set", "structure=5")
+    assert code == 3 and "is a number" in errors, errors
+    for order in (("band=[2,8]", "rms=0.1g", "kind=random"), ("kind=random", "rms=0.1g", "band=[2,8]")):
+        done = program.run("check", SPONGE, "--set", "excitation.displacement=null", *[
+            word for one in order for word in ("--set", "excitation." + one)])
+        assert done[0] == 0, done
+
+
 def test_version():
     """`version` and --version print the versions that the daemon tells."""
     code, out, errors = program.run("version")
