@@ -92,7 +92,10 @@ static Status url_check(ApiCall *call, Problem *problem) {
     curl_free(host);
     curl_url_cleanup(parsed);
     return is_valid ? STATUS_OK
-                    : problem_add(problem, STATUS_USAGE, "--server",
+                    : problem_add(problem, STATUS_USAGE,
+                                  ((const ClientSettings *)call->settings)->server != NULL
+                                      ? "--server"
+                                      : "IMPACTD_SERVER",
                                   "must be like http://127.0.0.1:8080 or https://HOST/PATH: only "
                                   "http and https are supported, without user, query, fragment, "
                                   "blanks and control characters; a token is read from "
@@ -539,6 +542,11 @@ static Status problem_read(ApiCall *call, Problem *problem) {
         json_get_item(reply, "errors", 0) == NULL)
         return problem_set(problem, status, "the server answers %d without a reason",
                            call->answer.code);
+    const char *detail = json_get_text(reply, "detail");
+    detail = detail != NULL ? detail : json_get_text(reply, "title");
+    if (call->answer.code == 401 && call->token[0] == '\0' && detail != NULL)
+        return problem_set(problem, status, "%.300s; set IMPACTD_TOKEN or give --token-file FILE",
+                           detail);
     api_add_faults(reply, status, problem);
     return status;
 }

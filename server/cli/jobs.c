@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/base/rfc3339.h"
+#include "core/base/spelling.h"
 #include "server/cli/client.h"
 #include "server/cli/files.h"
 #include "server/cli/report.h"
@@ -353,6 +354,8 @@ static Status compare_act(ApiCall *call, Problem *problem) {
 static const char *const formats[] = {"json", "csv", "npy", "npz", "mat", "zip", "svg", NULL};
 static const char *const binary_formats[] = {"npy", "npz", "mat", "zip", NULL};
 // Parts of a result that have one format, and no extension in their path.
+static const char *const parts[] = {"series", "psd",    "impacts", "energy", "manifest",
+                                    "job",    "result", "bundle",  NULL};
 static const char *const plain_parts[] = {"result", "job", "manifest", NULL};
 
 static bool is_among(const char *const *texts, const char *text) {
@@ -384,11 +387,14 @@ static Status part_choose(const ApiCall *call, char what[PART_SIZE], Problem *pr
                         : !is_table                     ? "result"
                         : strcmp(extension, "zip") == 0 ? "bundle"
                                                         : "series";
-    if (!is_part(typed))
+    // Names that are not here, as impacts/1/force, are the server's.
+    const char *near = spelling_nearest(parts, typed);
+    if (!is_part(typed) || (near != NULL && !is_among(parts, typed)))
         return problem_set(problem, STATUS_USAGE,
-                           "a result has no %.100s; it has series, psd, impacts, energy, manifest, "
-                           "bundle and others",
-                           typed);
+                           "a result has no %.100s%s%s%s; it has series, psd, impacts, "
+                           "impacts/N/force, energy, manifest, job, result and bundle",
+                           typed, near != NULL ? " (did you mean " : "", near != NULL ? near : "",
+                           near != NULL ? "?)" : "");
     const bool is_plain = is_among(plain_parts, typed);
     if (is_plain && is_table)
         return problem_add(problem, STATUS_USAGE, "--output", "must end in .json for the %s",

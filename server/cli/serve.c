@@ -237,12 +237,15 @@ static Status tokens_require(const Address *address, size_t valid, Problem *prob
                        is_loopback ? "" : ", or listen on 127.0.0.1");
 }
 
-static void serve_greet(const Server *server, const ServeSettings *settings, const App *app) {
+static void serve_greet(const Server *server, const ServeSettings *settings, const App *app,
+                        bool needs_token) {
     const char *url = app->base_url[0] != '\0' ? app->base_url : server_url(server);
     printf("impactd %s listens on %s\n", program_version, server_url(server));
     printf("data in %s, %llu workers; Ctrl-C stops\n\n", settings->data,
            (unsigned long long)settings->workers);
-    printf("curl -s %s/v1/examples/paper_free_sponge | curl -s --json @- %s/v1/jobs\n", url, url);
+    const char *header = needs_token ? "-H \"Authorization: Bearer $IMPACTD_TOKEN\" " : "";
+    printf("curl -s %s%s/v1/examples/paper_free_sponge | curl -s %s--json @- %s/v1/jobs\n", header,
+           url, header, url);
     fflush(stdout);
 }
 
@@ -303,7 +306,8 @@ typedef struct Serving {
 static void serve_until_stopped(Serving *serving, const ServeSettings *settings,
                                 const sigset_t *signals, Problem *problem) {
     atomic_store(&serving->app.server, serving->server);
-    serve_greet(serving->server, settings, &serving->app);
+    serve_greet(serving->server, settings, &serving->app,
+                tokens_usable(serving->access.tokens) > 0);
     process_notify_systemd("READY=1");
     const int signal = serve_wait(signals, settings, problem);
     process_notify_systemd("STOPPING=1");

@@ -303,6 +303,8 @@ def test_wrong_words_are_usage():
             assert code == 2 and out == "" and words in errors and "secret" not in errors, (arguments, code, errors)
         code, _, errors = client("http://127.0.0.1:1", "get", "r-1", environment={"IMPACTD_TOKEN": "secret of mine"})
         assert code == 2 and "IMPACTD_TOKEN" in errors and "secret" not in errors, (code, errors)
+        code, _, errors = client("http://127.0.0.1:1", "get", "r-1", "seires")
+        assert code == 2 and "did you mean series?" in errors, (code, errors)
 
 
 def test_a_hostile_server_is_bounded_and_refused():
@@ -364,6 +366,7 @@ def test_codes_mean_what_the_shell_is_told():
         with fake(say(http_code, b'{"title": "Because"}')) as (url, _):
             code, _, errors = client(url, "get", "r-1")
             assert code == expected and "Because" in errors, (http_code, code, errors)
+            assert ("set IMPACTD_TOKEN or give --token-file" in errors) == (http_code == 401), errors
 
 
 def test_a_busy_daemon_is_asked_again():
