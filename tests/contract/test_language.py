@@ -10,7 +10,6 @@ import html
 import json
 import os
 import re
-import subprocess
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
@@ -147,14 +146,20 @@ def python_prose(path, text):
                 yield f"{path}:{getattr(node, 'lineno', 1)}", prose
 
 
+def sources():
+    """Paths of all files that users may read: those of four folders, and each README."""
+    for folder, folders, files in os.walk(program.SOURCE):
+        folders[:] = sorted(set(folders) - {"vendor", "node_modules", "build", ".git"})
+        top = os.path.relpath(folder, program.SOURCE).split(os.sep)[0]
+        for file in sorted(files):
+            if top in ("core", "server", "schema", "web") or file.endswith(".md"):
+                yield os.path.relpath(os.path.join(folder, file), program.SOURCE)
+
+
 def prose():
     """Every text that users meet: (place, text)."""
-    listed = subprocess.run(["git", "ls-files", "core", "server", "schema", "web", "*.md"], cwd=program.SOURCE,
-                            capture_output=True, text=True, check=True).stdout.split("\n")
-    for path in filter(None, listed):
+    for path in sources():
         name = os.path.join(program.SOURCE, path)
-        if "/vendor/" in path or not os.path.exists(name):
-            continue
         readers = {".c": c_prose, ".h": c_prose, ".js": script_prose, ".html": html_prose, ".md": markdown_prose,
                    ".py": python_prose, ".txt": lines_prose}
         reader = readers.get(os.path.splitext(path)[1])
