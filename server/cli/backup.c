@@ -77,9 +77,10 @@ static int backup_run_copy(const Command *self, BackupSettings *settings, const 
     }
     progress_bar_stop(&bar);
     if (status == STATUS_OK)
-        printf("%s: %" PRIu64 " bytes, checked; %" PRIu64 " jobs, %" PRIu64 " results, %" PRIu64
-               " materials\n",
-               path, made.bytes, made.jobs, made.results, made.materials);
+        command_print_line(stdout,
+                           "%s: %" PRIu64 " bytes, checked; %" PRIu64 " jobs, %" PRIu64
+                           " results, %" PRIu64 " materials",
+                           path, made.bytes, made.jobs, made.results, made.materials);
     if (status == STATUS_CANCELLED) {
         problem_clear(problem);
         (void)problem_set(problem, status, "interrupted; nothing is left of it");

@@ -122,7 +122,8 @@ Status api_open(ApiCall *call, Problem *problem) {
     for (char *end = strchr(call->url, '\0'); end > call->url && end[-1] == '/'; end--)
         end[-1] = '\0';
     if (api_exposes_token(call))
-        fprintf(stderr, "impactd: warning: the token is sent unencrypted to %s\n", call->url);
+        command_print_line(stderr, "impactd: warning: the token is sent unencrypted to %s",
+                           call->url);
     return STATUS_OK;
 }
 
@@ -580,12 +581,22 @@ Status api_send(ApiCall *call, Problem *problem) {
                    problem);
 }
 
+// An answer without its list must not count as an empty one.
+static Status api_check_list(ApiCall *call, Problem *problem) {
+    const char *list = call->action->list;
+    char wanted[80];
+    snprintf(wanted, sizeof wanted, "an object with a list \"%.40s\"", list != NULL ? list : "");
+    return list == NULL || json_has_list(api_reply(call), list)
+               ? STATUS_OK
+               : api_unexpected(call, wanted, problem);
+}
+
 // The pages that follow are added to the first one.
 Status api_send_pages(ApiCall *call, size_t more, Problem *problem) {
     Bytes all = {0};
     char last[sizeof call->answer.next] = "";
     TRY(api_send(call, problem));
-    Status status = STATUS_OK;
+    Status status = api_check_list(call, problem);
     for (size_t page = 0; call->answer.next[0] != '\0' && page < more && status == STATUS_OK;
          page++) {
         Bytes path = api_action_path(call);
@@ -600,6 +611,8 @@ Status api_send_pages(ApiCall *call, size_t more, Problem *problem) {
         path.count = path.at != NULL ? strcspn(path.at, "?") : 0;
         bytes_text(&path, call->answer.next);
         status = api_get(call, path, problem);
+        if (status == STATUS_OK)
+            status = api_check_list(call, problem);
         if (status == STATUS_OK)
             status = json_edit_extend(&all, &call->answer.body, problem);
     }
@@ -633,9 +646,8 @@ const JsonDocument *api_reply(ApiCall *call) {
     return call->reply = json_open(&call->answer.body);
 }
 
-void api_print(const ApiCall *call) {
-    if (call->answer.body.count > 0)
-        (void)fwrite(call->answer.body.at, 1, call->answer.body.count, stdout);
+Status api_print(const ApiCall *call, Problem *problem) {
+    return output_write(call->answer.body.at, call->answer.body.count, problem);
 }
 
 Status api_print_tables(ApiCall *call, Problem *problem) {
@@ -643,14 +655,17 @@ Status api_print_tables(ApiCall *call, Problem *problem) {
     const char *action = call->action->name;
     PrintTableForm form = terminal_table_form();
     size_t rows = 1;
-    if (action == NULL || strcmp(action, "list") != 0)
-        form.width = 0; // only lists are cut
+    if (action != NULL && strcmp(action, "list") != 0)
+        form.width = 0; // only lists and comparisons are cut
     if (view == NULL || ((const ClientSettings *)call->settings)->json)
-        api_print(call);
-    else
-        TRY(print_table_print_json(&call->answer.body, view, form, stdout, &rows, problem));
+        return api_print(call, problem);
+    if (api_reply(call) == NULL)
+        return api_unexpected(call, "an object", problem);
+    TRY(print_table_print_json(&call->answer.body, view, form, stdout, &rows, problem));
+    if (rows == 0 && call->action->list == NULL)
+        return api_unexpected(call, "what was requested", problem);
     if (rows == 0)
-        fprintf(stderr, "impactd %s: none found\n", call->command->name);
+        command_print_line(stderr, "impactd %s: none found", call->command->name);
     return STATUS_OK;
 }
 
@@ -679,9 +694,17 @@ bool api_is_id(const char *text) {
                length;
 }
 
-Status api_unexpected(const char *wanted, Problem *problem) {
+Status api_unexpected(const ApiCall *call, const char *wanted, Problem *problem) {
+    const Bytes *body = &call->answer.body;
+    char start[41];
+    snprintf(start, sizeof start, "%.*s", body->count < 40 ? (int)body->count : 40,
+             body->count > 0 ? body->at : "");
+    for (char *c = start; *c != '\0'; c++) // may be no text, and is cut
+        *c = *c < ' ' || *c > '~' ? '?' : *c;
     return problem_set(problem, STATUS_UNREACHABLE,
-                       "the answer is not %s; is the server really impactd?", wanted);
+                       "the answer is not %s, but begins with \"%s\"; is the server at %.200s "
+                       "really impactd?",
+                       wanted, start, call->url);
 }
 
 Bytes api_path(const char *format, ...) {

@@ -40,6 +40,7 @@ typedef struct ApiAction {
     const char *query;  // options that are sent as they are named: "q kind"
     const char *needs;  // an option that must be given; NULL: none
     const char *detail; // for an `act` of several actions
+    const char *list;   // the list that each page of the answer has; NULL: none
 } ApiAction;
 
 typedef struct ApiAnswer {
@@ -119,12 +120,12 @@ Status api_download(ApiCall *call, ApiRequest *request, const char *path, Proble
 // Reads the answer, until the next one is read; NULL: it is no object.
 const JsonDocument *api_reply(ApiCall *call);
 // Prints the answer as it came.
-void api_print(const ApiCall *call);
+Status api_print(const ApiCall *call, Problem *problem);
 // Prints the answer as tables by the view of the command or, with --json or without a view, as it
 // came.
 Status api_print_tables(ApiCall *call, Problem *problem);
-// STATUS_UNREACHABLE: the response is not what impactd sends.
-Status api_unexpected(const char *wanted, Problem *problem);
+// STATUS_UNREACHABLE: the answer is not what impactd sends.
+Status api_unexpected(const ApiCall *call, const char *wanted, Problem *problem);
 // Adds the faults of a problem document (RFC 9457) to `problem`, with `status`.
 void api_add_faults(const JsonDocument *document, Status status, Problem *problem);
 

@@ -1,40 +1,66 @@
 // What commands share: usage faults, exit codes, actions, the data directory.
 #include "server/cli/command.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include "core/base/spelling.h"
 #include "server/json/table.h"
 
+void command_print_line(FILE *file, const char *format, ...) {
+    enum { LINE_SIZE = 8192, COLUMNS_MIN = 30, INDENT = 2 };
+    char line[LINE_SIZE];
+    struct winsize size = {.ws_col = 0};
+    va_list arguments;
+    va_start(arguments, format);
+    text_fit_format(line, sizeof line, format, arguments);
+    va_end(arguments);
+    text_make_printable(line);
+    const bool has_columns =
+        ioctl(fileno(file), TIOCGWINSZ, &size) == 0 && size.ws_col >= COLUMNS_MIN;
+    size_t used = 0;
+    for (const char *word = line; *word != '\0';) {
+        char piece[LINE_SIZE];
+        const size_t blanks = strspn(word, " "), length = blanks + strcspn(word + blanks, " ");
+        snprintf(piece, sizeof piece, "%.*s", (int)length, word);
+        if (has_columns && used > INDENT && used + text_width(piece) > size.ws_col) {
+            fprintf(file, "\n%*s", INDENT, "");
+            used = INDENT;
+            memmove(piece, piece + blanks, length - blanks + 1);
+        }
+        fputs(piece, file);
+        used += text_width(piece);
+        word += length;
+    }
+    fputc('\n', file);
+}
+
 void command_print_faults(const char *name, const char *separator, const char *quote,
                           const Problem *problem) {
-    char shown[1024];
-    text_fit(shown, sizeof shown, name);
-    text_make_printable(shown);
-    name = shown;
     for (size_t i = 0; i < problem->count && i < PROBLEM_FAULTS; i++) {
-        Fault fault = problem->faults[i];
-        text_make_printable(fault.pointer);
-        text_make_printable(fault.detail);
-        fprintf(stderr, "%s: %s%s%s", name, fault.pointer,
-                fault.pointer[0] != '\0' ? separator : "", fault.detail);
-        if (fault.did_you_mean[0] != '\0')
-            fprintf(stderr, " (did you mean %s%s%s?)", quote, fault.did_you_mean, quote);
-        fputc('\n', stderr);
+        const Fault *fault = &problem->faults[i];
+        const bool has_near = fault->did_you_mean[0] != '\0';
+        command_print_line(stderr, "%s: %s%s%s%s%s%s%s%s", name, fault->pointer,
+                           fault->pointer[0] != '\0' ? separator : "", fault->detail,
+                           has_near ? " (did you mean " : "", has_near ? quote : "",
+                           fault->did_you_mean, has_near ? quote : "", has_near ? "?)" : "");
     }
     if (problem->count > PROBLEM_FAULTS)
-        fprintf(stderr, "%s: and %zu more faults\n", name, problem->count - PROBLEM_FAULTS);
+        command_print_line(stderr, "%s: and %zu more faults", name,
+                           problem->count - PROBLEM_FAULTS);
     if (problem->count == 0)
-        fprintf(stderr, "%s: %s\n", name, problem->detail);
+        command_print_line(stderr, "%s: %s", name, problem->detail);
 }
 
 int command_error(const char *name, const Problem *problem) {
     char full[40];
     snprintf(full, sizeof full, "impactd %.20s", name);
     command_print_faults(full, " ", "", problem);
-    fprintf(stderr, "see impactd help %s\n", name);
+    command_print_line(stderr, "see impactd help %s", name);
     return COMMAND_USAGE;
 }
 
@@ -63,8 +89,8 @@ int command_end(const Command *self, Status status, const Problem *problem) {
     if (status == STATUS_USAGE)
         return command_error(self->name, problem);
     if (status != STATUS_OK)
-        fprintf(stderr, "impactd %s: %s\n", self->name,
-                problem->detail[0] != '\0' ? problem->detail : status_title(status));
+        command_print_line(stderr, "impactd %s: %s", self->name,
+                           problem->detail[0] != '\0' ? problem->detail : status_title(status));
     return command_exit(status);
 }
 

@@ -3,6 +3,8 @@
 #ifndef SERVER_CLI_COMMAND_H
 #define SERVER_CLI_COMMAND_H
 
+#include <stdio.h>
+
 #include "core/base/field.h"
 #include "server/options.h"
 
@@ -50,8 +52,11 @@ const Command *command_find(const char *name); // NULL if there is none
 // The whole program: finds the command, answers --help, runs it. Returns the exit code.
 int command_main(int argc, char *const *argv);
 
+// Prints a line for people. Control characters, which operands, files and servers may have, become
+// '?'; on a terminal, lines break between words.
+void command_print_line(FILE *file, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
 // Prints all faults on stderr, one a line: NAME: POINTER, separator, detail (did you mean ...?).
-// Control characters, which a fault may quote from a file, are replaced.
 void command_print_faults(const char *name, const char *separator, const char *quote,
                           const Problem *problem);
 

@@ -258,13 +258,9 @@ static int unknown_refuse(const char *name) {
     for (size_t i = 0; i < COUNT(commands); i++)
         names[i] = commands[i] == NULL ? NULL : commands[i]->name;
     const char *near = spelling_nearest(names, name);
-    char shown[200];
-    text_fit(shown, sizeof shown, name);
-    text_make_printable(shown);
-    fprintf(stderr, "impactd: %s is not a command", shown);
-    if (near != NULL)
-        fprintf(stderr, " (did you mean %s?)", near);
-    fputs("; impactd --help lists them\n", stderr);
+    command_print_line(stderr, "impactd: %.200s is not a command%s%s%s; impactd --help lists them",
+                       name, near != NULL ? " (did you mean " : "", near != NULL ? near : "",
+                       near != NULL ? "?)" : "");
     return COMMAND_USAGE;
 }
 

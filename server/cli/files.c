@@ -75,9 +75,11 @@ const char *path_extension(const char *path) {
 
 enum { PATH_SIZE = 4096 };
 
+// Of an open output: its file `part`, -1 for standard output; with has_part it is at part_path.
 static char final_path[PATH_SIZE], part_path[PATH_SIZE];
 static volatile sig_atomic_t has_part;
 static int part = -1;
+static bool is_raw; // all bytes may go to a terminal
 static char farewell[512];
 static volatile sig_atomic_t farewell_size;
 
@@ -115,23 +117,54 @@ void output_farewell(const char *text) {
     (void)sigprocmask(SIG_SETMASK, &before, NULL);
 }
 
-Status output_open(const char *path, Problem *problem) {
-    if (path == NULL)
-        return STATUS_OK;
-    if (strlen(path) + sizeof ".XXXXXX" > PATH_SIZE)
-        return problem_set(problem, STATUS_IO, "%.200s...: the name is too long", path);
-    struct stat what;
-    // A rename would put a file in the place of a device or a pipe.
-    if (stat(path, &what) == 0 && !S_ISREG(what.st_mode))
-        return problem_set(problem, STATUS_IO, "%s is not a regular file", path);
+bool output_is_standard(const char *path) {
+    return strcmp(path, "-") == 0 || strcmp(path, "/dev/stdout") == 0;
+}
+
+// Sets final_path to the file that a path leads to over symbolic links, also if it is missing.
+static bool output_resolve(const char *path) {
+    enum { LINKS_MAX = 40 };
+    char target[PATH_SIZE];
+    ssize_t size;
     snprintf(final_path, sizeof final_path, "%s", path);
-    snprintf(part_path, sizeof part_path, "%.*s.XXXXXX", PATH_SIZE - 8, path);
+    for (int i = 0; i < LINKS_MAX; i++) {
+        if ((size = readlink(final_path, target, sizeof target - 1)) < 0)
+            return strlen(final_path) + sizeof ".XXXXXX" <= PATH_SIZE;
+        const char *slash = strrchr(final_path, '/');
+        const size_t folder =
+            target[0] != '/' && slash != NULL ? (size_t)(slash - final_path) + 1 : 0;
+        if (folder + (size_t)size >= PATH_SIZE)
+            return false;
+        target[size] = '\0';
+        memcpy(final_path + folder, target, (size_t)size + 1);
+    }
+    return false;
+}
+
+// A rename would put a file in the place of a device or a pipe.
+static bool output_is_special(const char *path) {
+    struct stat what;
+    return stat(path, &what) == 0 && !S_ISREG(what.st_mode);
+}
+
+Status output_open(const char *path, Problem *problem) {
+    is_raw = path != NULL && output_is_standard(path);
+    if (path == NULL || is_raw)
+        return STATUS_OK;
+    if (strlen(path) >= PATH_SIZE || !output_resolve(path))
+        return problem_set(problem, STATUS_IO,
+                           "%.200s cannot be written: the name, or that of its target, is too long",
+                           path);
+    snprintf(part_path, sizeof part_path, "%.*s.XXXXXX", PATH_SIZE - 8, final_path);
+    const bool is_special = output_is_special(path);
     sigset_t before;
-    signals_hold(&before);
-    part = mkstemp(part_path);
-    has_part = part >= 0;
+    if (!is_special)
+        signals_hold(&before);
+    part = is_special ? open(path, O_WRONLY | O_CLOEXEC) : mkstemp(part_path);
     const int error = errno;
-    (void)sigprocmask(SIG_SETMASK, &before, NULL);
+    has_part = part >= 0 && !is_special;
+    if (!is_special)
+        (void)sigprocmask(SIG_SETMASK, &before, NULL);
     if (part < 0)
         return problem_set(problem, STATUS_IO, "%s cannot be written: %s", path, strerror(error));
     return STATUS_OK;
@@ -139,7 +172,15 @@ Status output_open(const char *path, Problem *problem) {
 
 Status output_write(const void *bytes, size_t size, Problem *problem) {
     const char *at = bytes;
-    if (part < 0 && fwrite(bytes, 1, size, stdout) < size)
+    const bool is_plain = part < 0 && !is_raw && isatty(STDOUT_FILENO);
+    bool is_whole = true;
+    for (size_t i = 0; part < 0 && is_plain && i < size && is_whole; i++) {
+        const unsigned char c = (unsigned char)at[i];
+        is_whole = putchar((c < ' ' && strchr("\n\r\t", c) == NULL) || c == 0x7f ? '?' : c) != EOF;
+    }
+    if (part < 0 && !is_plain)
+        is_whole = size == 0 || fwrite(bytes, 1, size, stdout) == size;
+    if (!is_whole)
         return problem_set(problem, STATUS_IO, "standard output cannot be written");
     while (part >= 0 && size > 0) {
         const ssize_t done = write(part, at, size);
@@ -155,8 +196,13 @@ Status output_write(const void *bytes, size_t size, Problem *problem) {
 }
 
 Status output_close(Problem *problem) {
-    if (part < 0)
-        return STATUS_OK;
+    if (!has_part) {
+        const bool is_written = part < 0 || close(part) == 0;
+        part = -1;
+        return is_written ? STATUS_OK
+                          : problem_set(problem, STATUS_IO, "%s cannot be written: %s", final_path,
+                                        strerror(errno));
+    }
     // mkstemp gives 0600; the file gets what any new file would get.
     const mode_t mask = umask(0);
     (void)umask(mask);
@@ -200,6 +246,9 @@ Status output_put(const char *path, const Bytes *bytes, Problem *problem) {
 }
 
 Status output_check(const char *path, Problem *problem) {
+    // To open a pipe and close it would end its reader.
+    if (output_is_special(path) && access(path, W_OK) == 0)
+        return STATUS_OK;
     const Status status = output_open(path, problem);
     output_drop();
     return status;

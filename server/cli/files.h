@@ -41,8 +41,11 @@ Status record_files_add(struct Db *db, const RecordFiles *files, Problem *proble
 // "csv" of "/data/out.csv"; NULL if there is none.
 const char *path_extension(const char *path);
 
-// Opens a new file beside `path`, or standard output for NULL. One output at a time. STATUS_IO,
-// with the reason.
+// Whether an output is "-" or /dev/stdout.
+bool output_is_standard(const char *path);
+// Opens a new file beside `path` or beside the file that a symbolic link leads to; a device or a
+// pipe itself; standard output for NULL and "-". A terminal gets no control characters there,
+// except for "-". One output at a time. STATUS_IO, with the reason.
 Status output_open(const char *path, Problem *problem);
 Status output_write(const void *bytes, size_t size, Problem *problem);
 // Makes the file durable and gives it its name; removes it if that fails.

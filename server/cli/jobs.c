@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "core/base/rfc3339.h"
@@ -30,7 +29,7 @@ static Status job_read(ApiCall *call, Problem *problem) {
     const char *id = job_text(call, "id"), *status = job_text(call, "status");
     return id != NULL && api_is_id(id) && status != NULL && strlen(status) <= 40
                ? STATUS_OK
-               : api_unexpected("a job", problem);
+               : api_unexpected(call, "a job", problem);
 }
 
 static bool job_is_final(const ApiCall *call) {
@@ -78,7 +77,7 @@ static Status job_result(ApiCall *call, const char *id, char result[96], Problem
     if (made == NULL)
         TRY(job_verdict(call, problem));
     if (made == NULL || !api_is_id(made))
-        return api_unexpected("a job with a result", problem);
+        return api_unexpected(call, "a job with a result", problem);
     snprintf(result, 96, "%s", made);
     return STATUS_OK;
 }
@@ -185,8 +184,7 @@ static Status submit_send(ApiCall *call, Problem *problem) {
                           .idempotency_key = settings->idempotency_key};
     TRY(api_ask(call, &request, problem));
     if (settings->dry_run) {
-        api_print(call);
-        return STATUS_OK;
+        return api_print(call, problem);
     }
     TRY(job_read(call, problem));
     snprintf(call->id, sizeof call->id, "%s", job_text(call, "id"));
@@ -199,7 +197,7 @@ static Status submit_send(ApiCall *call, Problem *problem) {
     if (wait > 0 && !job_is_final(call))
         status = job_follow(call, call->id, stderr, problem);
     if (is_json && (status == STATUS_OK || status == STATUS_TIMEOUT))
-        api_print(call);
+        TRY(api_print(call, problem));
     // A job that has ended is reported also if the end was not waited for.
     return status == STATUS_OK && job_is_final(call) ? job_verdict(call, problem) : status;
 }
@@ -222,7 +220,7 @@ static Status watch_act(ApiCall *call, Problem *problem) {
     const bool is_json = ((const ClientSettings *)call->settings)->json;
     TRY(job_follow(call, call->operands[0], is_json ? NULL : stdout, problem));
     if (is_json)
-        api_print(call);
+        TRY(api_print(call, problem));
     return job_verdict(call, problem);
 }
 
@@ -281,8 +279,7 @@ static Status jobs_act(ApiCall *call, Problem *problem) {
     call->action = &action;
     TRY(api_send_pages(call, (limit - 1) / PAGE_JOBS, problem));
     if (settings->client.json) {
-        api_print(call);
-        return STATUS_OK;
+        return api_print(call, problem);
     }
     (void)api_reply(call);
     for (size_t i = 0; i < COUNT(heads); i++)
@@ -293,31 +290,33 @@ static Status jobs_act(ApiCall *call, Problem *problem) {
         print_table_print(&table, &form, stdout);
     print_table_clear(&table);
     if (count == 0)
-        fputs("impactd jobs: none found\n", stderr);
+        command_print_line(stderr, "impactd jobs: none found");
     else if (call->answer.next[0] != '\0' || json_get_item(call->reply, "jobs", count) != NULL)
-        fprintf(stderr, "impactd jobs: these are the newest %zu; --limit N or --all shows more\n",
-                count);
+        command_print_line(
+            stderr, "impactd jobs: these are the newest %zu; --limit N or --all shows more", count);
     return STATUS_OK;
 }
 
-// Opens an address in the browser of the desktop, if there is one.
-static bool browser_open(const char *url) {
+// Opens an address in the browser of the desktop, if there is one, and does not wait for it.
+static void browser_open(const char *url) {
     extern char **environ;
     const char *const arguments[] = {"xdg-open", url, NULL};
     posix_spawn_file_actions_t actions;
-    pid_t child = 0;
-    int code = 0;
-    if (getenv("DISPLAY") == NULL && getenv("WAYLAND_DISPLAY") == NULL)
-        return false;
-    if (posix_spawn_file_actions_init(&actions) != 0)
-        return false;
-    // What a browser prints does not belong on this terminal.
+    posix_spawnattr_t attributes;
+    pid_t child;
+    if ((getenv("DISPLAY") == NULL && getenv("WAYLAND_DISPLAY") == NULL) ||
+        posix_spawn_file_actions_init(&actions) != 0)
+        return;
+    // What a browser prints does not belong on this terminal, nor does its Ctrl-C reach a browser.
     for (int number = STDIN_FILENO; number <= STDERR_FILENO; number++)
         (void)posix_spawn_file_actions_addopen(&actions, number, "/dev/null", O_RDWR, 0);
-    const bool is_started = posix_spawnp(&child, arguments[0], &actions, NULL,
-                                         (char *const *)(uintptr_t)arguments, environ) == 0;
+    if (posix_spawnattr_init(&attributes) == 0) {
+        (void)posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+        (void)posix_spawnp(&child, arguments[0], &actions, &attributes,
+                           (char *const *)(uintptr_t)arguments, environ);
+        (void)posix_spawnattr_destroy(&attributes);
+    }
     (void)posix_spawn_file_actions_destroy(&actions);
-    return is_started && waitpid(child, &code, 0) == child && code == 0;
 }
 
 static Status open_act(ApiCall *call, Problem *problem) {
@@ -326,8 +325,9 @@ static Status open_act(ApiCall *call, Problem *problem) {
     char url[2200];
     (void)problem;
     snprintf(url, sizeof url, "%.2000s/%s%.100s", call->url, page, id);
-    (void)browser_open(url);
-    printf("%s\n", url);
+    puts(url);
+    (void)fflush(stdout);
+    browser_open(url);
     return STATUS_OK;
 }
 
@@ -336,8 +336,7 @@ static const PrintTableView compare_view = {
     .lists = (const PrintTableColumns[]){
         {"inputs", {"pointer", "a", "b", "detail"}},
         {"metrics", {"name", "unit", "a", "b", "difference", "relative"}},
-        {"channels",
-         {"channel", "unit", "rms", "other_rms", "difference_rms", "relative", "correlation"}},
+        {"channels", {"channel", "unit", "rms", "other_rms", "difference_rms", "correlation"}},
         {"psd", {"channel", "unit", "from", "to", "level", "difference", "power"}},
         {NULL, {NULL}}}};
 
@@ -378,7 +377,7 @@ enum { PART_SIZE = 112 };
 static Status part_choose(const ApiCall *call, char what[PART_SIZE], Problem *problem) {
     const char *output = ((const JobsSettings *)call->settings)->output;
     const char *extension = output != NULL ? path_extension(output) : NULL;
-    if (output != NULL && !is_among(formats, extension))
+    if (output != NULL && !output_is_standard(output) && !is_among(formats, extension))
         return problem_add(
             problem, STATUS_USAGE, "--output",
             "must end in one of .json, .csv, .npy, .npz, .mat, .zip, .svg, is %.200s", output);
@@ -406,7 +405,8 @@ static Status part_choose(const ApiCall *call, char what[PART_SIZE], Problem *pr
              is_complete ? "" : extension);
     if (is_among(binary_formats, path_extension(what)) && output == NULL && isatty(STDOUT_FILENO))
         return problem_set(problem, STATUS_USAGE,
-                           "does not print binary data on a terminal; use -o FILE.%s",
+                           "does not print binary data on a terminal; use -o FILE.%s, or -o - to "
+                           "print it all the same",
                            path_extension(what));
     return STATUS_OK;
 }
@@ -414,7 +414,7 @@ static Status part_choose(const ApiCall *call, char what[PART_SIZE], Problem *pr
 // clang-format off
 static const Field get_fields[] = {
     CLIENT_ROWS,
-    FIELD_TEXT(JobsSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file; its extension is the format (standard output)"),
+    FIELD_TEXT(JobsSettings, output, 4000, PRESENCE_OPTIONAL, 0, "write to this file; its extension is the format; - is standard output (default)"),
     FIELD_TEXT(JobsSettings, channels, 4000, PRESENCE_OPTIONAL, 0, "channels of the series, separated by commas (all)"),
     FIELD_REAL(JobsSettings, from, "s", AT_MIN(0), OPTIONAL, "start of the series"),
     FIELD_REAL(JobsSettings, to, "s", AT_MIN(0), OPTIONAL, "end of the series, inclusive"),
@@ -518,9 +518,11 @@ const Command command_jobs = {
             "\n"
             "The column \"time\" has the duration of the run, or the progress of a running job.\n",
     JOBS_OPTIONS(jobs_fields),
-    .actions =
-        &(const ApiAction){
-            .takes = "no operands", .operands = "", .act = jobs_act, .query = "status q"},
+    .actions = &(const ApiAction){.takes = "no operands",
+                                  .operands = "",
+                                  .act = jobs_act,
+                                  .query = "status q",
+                                  .list = "jobs"},
 };
 
 const Command command_open = {

@@ -101,11 +101,10 @@ static Status materials_print_revision(ApiCall *call, Problem *problem) {
     const char *slug = json_get_text(reply, "slug"), *status = json_get_text(reply, "status");
     const double revision = json_get_number(reply, "revision");
     if (((const ClientSettings *)call->settings)->json) {
-        api_print(call);
-        return STATUS_OK;
+        return api_print(call, problem);
     }
     if (slug == NULL || status == NULL || isnan(revision))
-        return api_unexpected("a revision", problem);
+        return api_unexpected(call, "a revision", problem);
     const bool is_own = json_get_flag(json_get_object(reply, "review"), "self_approved");
     printf("%s@%.0f %s%s\n", slug, revision, status, is_own ? ", by its own author" : "");
     return STATUS_OK;
@@ -148,7 +147,7 @@ static Status materials_write(ApiCall *call, Bytes path, Problem *problem) {
     ApiRequest request = {.method = "POST", .path = path, .if_match = state};
     Status status = STATUS_STALE;
     if (state[0] == '\0')
-        status = api_unexpected("a material with an ETag", problem);
+        status = api_unexpected(call, "a material with an ETag", problem);
     else if (from != COUNT_ABSENT && from != latest)
         (void)problem_set(problem, status, "the newest revision is %.63s@%llu, not %.63s@%llu",
                           slug, latest, slug, (unsigned long long)from);
@@ -179,7 +178,7 @@ static Status materials_show(ApiCall *call, Problem *problem) {
     if (is_material)
         fputs(text.at, stdout);
     bytes_clear(&text);
-    return is_material ? STATUS_OK : api_unexpected("a material", problem);
+    return is_material ? STATUS_OK : api_unexpected(call, "a material", problem);
 }
 
 static Status materials_add(ApiCall *call, Problem *problem) {
@@ -293,22 +292,22 @@ static Status materials_import(ApiCall *call, Problem *problem) {
 // clang-format off
 #define MATERIAL "/v1/materials/{}"
 static const ApiAction materials_actions[] = {
-    {"list", "no operands", "", api_show, NULL, "/v1/materials?limit=1000", "q kind status e T_c", NULL, NULL},
-    {"show", "SLUG or SLUG@REVISION", "r", materials_show, NULL, MATERIAL, NULL, NULL, NULL},
-    {"add", "FILE.json", "f", materials_add, "POST", "/v1/materials", NULL, NULL, NULL},
-    {"revise", "SLUG without a revision and FILE.json", "sf", materials_revise, "POST", MATERIAL "/revisions", NULL, NULL, NULL},
-    {"revert", "SLUG without a revision and REVISION", "sn", materials_revert, "POST", MATERIAL "/revert", NULL, "comment", NULL},
-    {"approve", "SLUG@REVISION, as sponge@1", "v", materials_review, "POST", MATERIAL "/review", NULL, "reason", "approved"},
-    {"deprecate", "SLUG@REVISION, as sponge@1", "v", materials_review, "POST", MATERIAL "/review", NULL, "reason", "deprecated"},
-    {"history", "SLUG without a revision", "s", api_show, NULL, MATERIAL "/history?limit=1000", NULL, NULL, NULL},
-    {"diff", "SLUG [FROM [TO]], without a revision after SLUG", "s?nn", api_show, NULL, MATERIAL "/diff?from={}&to={}", NULL, NULL, NULL},
-    {"used-by", "SLUG or SLUG@REVISION", "r", api_show, NULL, MATERIAL "/used-by", NULL, NULL, NULL},
-    {"measure", "SLUG without a revision and TEST.json", "sf", materials_measure, "POST", MATERIAL "/measurements", "dry_run", NULL, NULL},
-    {"measurements", "SLUG without a revision", "s", api_show, NULL, MATERIAL "/measurements?limit=100", NULL, NULL, NULL},
-    {"propose", "SLUG without a revision", "s", materials_propose, NULL, MATERIAL "/proposal", "measurements separation as", NULL, NULL},
-    {"derived", "SLUG or SLUG@REVISION", "r", api_show, NULL, MATERIAL "/derived", "damper_mass structure_mass identified_for separation", "damper_mass", NULL},
-    {"export", "FILE.json or FILE.csv", "f", materials_export, NULL, NULL, NULL, NULL, NULL},
-    {"import", "FILE.json or FILE.csv", "f", materials_import, "POST", "/v1/materials/import", "dry_run", NULL, NULL},
+    {"list", "no operands", "", api_show, NULL, "/v1/materials?limit=1000", "q kind status e T_c", NULL, NULL, "materials"},
+    {"show", "SLUG or SLUG@REVISION", "r", materials_show, NULL, MATERIAL, NULL, NULL, NULL, NULL},
+    {"add", "FILE.json", "f", materials_add, "POST", "/v1/materials", NULL, NULL, NULL, NULL},
+    {"revise", "SLUG without a revision and FILE.json", "sf", materials_revise, "POST", MATERIAL "/revisions", NULL, NULL, NULL, NULL},
+    {"revert", "SLUG without a revision and REVISION", "sn", materials_revert, "POST", MATERIAL "/revert", NULL, "comment", NULL, NULL},
+    {"approve", "SLUG@REVISION, as sponge@1", "v", materials_review, "POST", MATERIAL "/review", NULL, "reason", "approved", NULL},
+    {"deprecate", "SLUG@REVISION, as sponge@1", "v", materials_review, "POST", MATERIAL "/review", NULL, "reason", "deprecated", NULL},
+    {"history", "SLUG without a revision", "s", api_show, NULL, MATERIAL "/history?limit=1000", NULL, NULL, NULL, "history"},
+    {"diff", "SLUG [FROM [TO]], without a revision after SLUG", "s?nn", api_show, NULL, MATERIAL "/diff?from={}&to={}", NULL, NULL, NULL, "differences"},
+    {"used-by", "SLUG or SLUG@REVISION", "r", api_show, NULL, MATERIAL "/used-by", NULL, NULL, NULL, NULL},
+    {"measure", "SLUG without a revision and TEST.json", "sf", materials_measure, "POST", MATERIAL "/measurements", "dry_run", NULL, NULL, NULL},
+    {"measurements", "SLUG without a revision", "s", api_show, NULL, MATERIAL "/measurements?limit=100", NULL, NULL, NULL, "measurements"},
+    {"propose", "SLUG without a revision", "s", materials_propose, NULL, MATERIAL "/proposal", "measurements separation as", NULL, NULL, NULL},
+    {"derived", "SLUG or SLUG@REVISION", "r", api_show, NULL, MATERIAL "/derived", "damper_mass structure_mass identified_for separation", "damper_mass", NULL, NULL},
+    {"export", "FILE.json or FILE.csv", "f", materials_export, NULL, NULL, NULL, NULL, NULL, NULL},
+    {"import", "FILE.json or FILE.csv", "f", materials_import, "POST", "/v1/materials/import", "dry_run", NULL, NULL, NULL},
     {.name = NULL},
 };
 // clang-format on

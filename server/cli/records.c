@@ -25,27 +25,28 @@ static void import_report(const char *path, const GroundMotionText *import,
     const RecordLook look = record_look(&import->samples, import->interval, settings->scale);
     const double peak = fmax(look.highest, -look.lowest);
     const char *unit = acceleration_unit_names[import->unit];
-    fprintf(stderr, "%s: %s, %zu samples, interval %s s, duration %.6g s; unit %s\n", path,
-            import->layout, import->samples.count, real_text(import->interval).at,
-            (double)(import->samples.count - 1) * import->interval, unit);
-    fprintf(stderr,
-            "%s: peak %.6g m/s^2 (%.6g g) at %.6g s; velocity: peak %.3g m/s, at the end %.3g "
-            "m/s\n",
-            path, peak, peak / G, (double)look.peak_at * import->interval, look.peak_velocity,
-            look.end_velocity);
+    command_print_line(stderr, "%s: %s, %zu samples, interval %s s, duration %.6g s; unit %s", path,
+                       import->layout, import->samples.count, real_text(import->interval).at,
+                       (double)(import->samples.count - 1) * import->interval, unit);
+    command_print_line(
+        stderr,
+        "%s: peak %.6g m/s^2 (%.6g g) at %.6g s; velocity: peak %.3g m/s, at the end %.3g m/s",
+        path, peak, peak / G, (double)look.peak_at * import->interval, look.peak_velocity,
+        look.end_velocity);
     if (import->stated_unit == CHOICE_ABSENT && settings->unit == CHOICE_ABSENT)
-        fprintf(stderr, "%s: warning: the file states no unit, %s is assumed\n", path, unit);
+        command_print_line(stderr, "%s: warning: the file states no unit, %s is assumed", path,
+                           unit);
     else if (import->stated_unit != CHOICE_ABSENT && import->stated_unit != import->unit)
-        fprintf(stderr, "%s: warning: the file states %s, %s is used\n", path,
-                acceleration_unit_names[import->stated_unit], unit);
+        command_print_line(stderr, "%s: warning: the file states %s, %s is used", path,
+                           acceleration_unit_names[import->stated_unit], unit);
 }
 
 static void import_warn(const char *path, const Excitation *excitation, Problem *doubts) {
     const Span span = {0};
     excitation_record.doubt(excitation, &span, "", doubts);
     for (size_t i = 0; i < doubts->count; i++)
-        fprintf(stderr, "%s: warning: %s %s\n", path, doubts->faults[i].pointer + 1,
-                doubts->faults[i].detail);
+        command_print_line(stderr, "%s: warning: %s %s", path, doubts->faults[i].pointer + 1,
+                           doubts->faults[i].detail);
 }
 
 static Status excitation_write(const ExcitationRecord *record, const char *output,
@@ -178,15 +179,15 @@ Status record_files_add(Db *db, const RecordFiles *files, Problem *problem) {
 static void record_report(const char *path, const JsonDocument *record, bool is_new) {
     const char *layout = json_get_text(record, "layout");
     const JsonDocument *warning;
-    fprintf(stderr, "%s: %s%s, %.0f samples, interval %.6g s; peak %.6g m/s^2 at %.6g s\n", path,
-            is_new ? "" : "already stored; ", layout != NULL ? layout : "-",
-            json_get_number(record, "count"), json_get_number(record, "interval"),
-            json_get_number(record, "peak"), json_get_number(record, "peak_time"));
+    command_print_line(stderr, "%s: %s%s, %.0f samples, interval %.6g s; peak %.6g m/s^2 at %.6g s",
+                       path, is_new ? "" : "already stored; ", layout != NULL ? layout : "-",
+                       json_get_number(record, "count"), json_get_number(record, "interval"),
+                       json_get_number(record, "peak"), json_get_number(record, "peak_time"));
     for (size_t i = 0; (warning = json_get_item(record, "warnings", i)) != NULL; i++) {
         const char *pointer = json_get_text(warning, "pointer");
         const char *detail = json_get_text(warning, "detail");
-        fprintf(stderr, "%s: warning: %s %s\n", path, pointer != NULL ? pointer : "",
-                detail != NULL ? detail : "");
+        command_print_line(stderr, "%s: warning: %s %s", path, pointer != NULL ? pointer : "",
+                           detail != NULL ? detail : "");
     }
 }
 
@@ -204,10 +205,9 @@ static Status records_add(ApiCall *call, Problem *problem) {
     TRY(api_ask(call, &request, problem));
     const JsonDocument *record = api_reply(call);
     if (json_get_text(record, "name") == NULL)
-        return api_unexpected("a record", problem);
+        return api_unexpected(call, "a record", problem);
     if (settings->client.json) {
-        api_print(call);
-        return STATUS_OK;
+        return api_print(call, problem);
     }
     record_report(input_name(path), record, call->answer.code == 201);
     printf("%s\n", json_get_text(record, "name"));
@@ -216,22 +216,23 @@ static Status records_add(ApiCall *call, Problem *problem) {
 
 static Status records_show(ApiCall *call, Problem *problem) {
     TRY(api_send(call, problem));
-    api_print(call);
-    return STATUS_OK;
+    if (json_get_text(api_reply(call), "name") == NULL)
+        return api_unexpected(call, "a record", problem);
+    return api_print(call, problem);
 }
 
 static Status records_delete(ApiCall *call, Problem *problem) {
     TRY(api_send(call, problem));
-    fprintf(stderr, "The record \"%s\" is deleted.\n", call->operands[0]);
+    command_print_line(stderr, "The record \"%s\" is deleted.", call->operands[0]);
     return STATUS_OK;
 }
 
 // clang-format off
 static const ApiAction records_actions[] = {
-    {"list", "no operand", "", api_show, NULL, "/v1/records?limit=500", "q", NULL, NULL},
-    {"add", "a file", "f", records_add, NULL, NULL, NULL, NULL, NULL},
-    {"show", "the name of a record", "t", records_show, NULL, "/v1/records/{}", NULL, NULL, NULL},
-    {"delete", "the name of a record", "t", records_delete, "DELETE", "/v1/records/{}", NULL, NULL, NULL},
+    {"list", "no operand", "", api_show, NULL, "/v1/records?limit=500", "q", NULL, NULL, "records"},
+    {"add", "a file", "f", records_add, NULL, NULL, NULL, NULL, NULL, NULL},
+    {"show", "the name of a record", "t", records_show, NULL, "/v1/records/{}", NULL, NULL, NULL, NULL},
+    {"delete", "the name of a record", "t", records_delete, "DELETE", "/v1/records/{}", NULL, NULL, NULL, NULL},
     {.name = NULL},
 };
 // clang-format on

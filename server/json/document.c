@@ -379,6 +379,14 @@ const JsonDocument *json_get_object(const JsonDocument *of, const char *name) {
     return json_object_get(of, name);
 }
 
+bool json_has_list(const JsonDocument *of, const char *name) {
+    const json_t *list = json_object_get(of, name);
+    bool is_list = json_is_array(list);
+    for (size_t i = 0; i < json_array_size(list); i++)
+        is_list = is_list && json_is_object(json_array_get(list, i));
+    return is_list;
+}
+
 const JsonDocument *json_get_item(const JsonDocument *of, const char *name, size_t i) {
     return json_array_get(json_object_get(of, name), i);
 }

@@ -58,6 +58,7 @@ const char *json_get_text(const JsonDocument *of, const char *name);
 double json_get_number(const JsonDocument *of, const char *name); // NAN: absent
 bool json_get_flag(const JsonDocument *of, const char *name);
 const JsonDocument *json_get_object(const JsonDocument *of, const char *name);
+bool json_has_list(const JsonDocument *of, const char *name); // of objects only, or empty
 // Element i of a list of objects; NULL behind the last.
 const JsonDocument *json_get_item(const JsonDocument *of, const char *name, size_t i);
 

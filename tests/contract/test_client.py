@@ -76,6 +76,18 @@ def test_jobs_lists_and_open_names_the_page():
     for arguments, page in (((), ""), (("j-1",), "#/jobs/j-1"), (("r-2",), "#/results/r-2")):
         done = program.run("open", *arguments, "--server", "https://sim.example/x/", environment=plain)
         assert done == (0, f"https://sim.example/x/{page}\n", ""), done
+    # A browser that runs on is not waited for.
+    with tempfile.TemporaryDirectory() as folder:
+        started = os.path.join(folder, "started")
+        with open(os.path.join(folder, "xdg-open"), "w", encoding="utf-8", opener=lambda p, f: os.open(p, f, 0o755)) as file:
+            file.write(f"#!/bin/sh\necho noise\necho $1 > {started}.part\nmv {started}.part {started}\nexec sleep 5\n")
+        began = time.monotonic()
+        done = program.run("open", environment={**plain, "DISPLAY": ":9", "PATH": folder + ":" + os.environ["PATH"]})
+        assert done == (0, "http://127.0.0.1:8080/\n", "") and time.monotonic() - began < 4, done
+        while not os.path.exists(started) and time.monotonic() - began < 20:
+            time.sleep(0.02)
+        with open(started, encoding="utf-8") as file:
+            assert file.read() == "http://127.0.0.1:8080/\n"
 
 
 def test_a_title_and_labels_change_no_number():
@@ -147,6 +159,9 @@ def test_binary_data_is_kept_off_a_terminal():
     os.close(slave)
     os.close(master)
     assert done.returncode == 2 and "-o FILE.npy" in done.stderr, done
+    with fake(say(body=b"NUMPY\x1b")) as (url, _):
+        code, out = program.on_terminal("get", "r-1", "series.npy", "-o", "-", IMPACTD_SERVER=url)
+        assert code == 0 and out == "NUMPY\x1b", out
 
 
 def test_waits_that_time_out_leave_the_job():
@@ -326,6 +341,17 @@ def test_a_hostile_server_is_bounded_and_refused():
             code, out, errors = client(url, "submit", SPONGE, "--json")
             assert code == 7 and out == "" and words in errors, (name, code, out[:200], errors[:500])
             assert len(seen) == 1, (name, seen)
+    # An answer without its list is not an empty list.
+    for body in (b"", b"[]", b"{}", b"<html>\xff", b'{"%s": {}}', b'{"%s": [1]}'):
+        for name, arguments in (("jobs", ("jobs",)), ("jobs", ("jobs", "--json")), ("materials", ("materials", "list")),
+                                ("records", ("records", "list")), ("history", ("materials", "history", "foam"))):
+            with fake(say(body=body.replace(b"%s", name.encode()))) as (url, _):
+                code, out, errors = client(url, *arguments)
+                assert code == 7 and out == "" and f'list "{name}"' in errors and "begins with" in errors, (arguments, body, out, errors)
+    for arguments in (("compare", "r-1", "r-2"), ("materials", "show", "foam"), ("records", "show", "a")):
+        with fake(say()) as (url, _):
+            code, out, errors = client(url, *arguments)
+            assert code == 7 and out == "" and "really impactd" in errors, (arguments, out, errors)
     # Gzip that was not asked for is not unpacked, and a job that never ends obeys --wait.
     with fake(say(body=b"\x1f\x8b\x08" + b"x" * 100, Content_Encoding="gzip")) as (url, _):
         assert client(url, "watch", "j-1")[0] == 7
@@ -462,9 +488,16 @@ def test_hostile_text_reaches_no_terminal():
     with fake(say(404, b'{"title": "gone away", "detail": ""}')) as (url, _):
         code, _, errors = client(url, "get", "r-1")
         assert code == 4 and "gone away" in errors, errors
-    for words in (("\x1b[31mx",), ("help", "\x1b[31mx"), ("check", "\x1b[31mx.json")):
+    for words in (("\x1b[31mx",), ("help", "\x1b[31mx"), ("check", "\x1b[31mx.json"), ("examples", "\x1b[31mx"),
+                  ("examples", "chirp", "-o", "/none/\x1b[31mx"), ("run", SPONGE, "-o", "\x1b[31mx.xls"), ("import", "\x1b[31mx")):
         code, out, errors = client(url, *words)
         assert code != 0 and "[31mx" in errors and "\x1b" not in out + errors, (words, errors)
+    with fake(say(body=b'{"name": "a\x7fb"}')) as (url, _):
+        code, out = program.on_terminal("records", "show", "a", IMPACTD_SERVER=url)
+        assert code == 0 and "a?b" in out, out
+    # Lines for people break between words at the terminal's width.
+    code, out = program.on_terminal("check", "/none/" + "x" * 70 + ".json", "--record", "y", columns=60)
+    assert code == 4 and "\n  /none/" not in out and "xxx.json:\n  cannot be read: No such file" in out, out
     code, _, errors = client(url, "check", SPONGE, "--vary", "duration=" + "1" * 2000 + ",2")
     assert code == 2 and "characters" in errors, errors
 

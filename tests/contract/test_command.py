@@ -240,7 +240,7 @@ def test_run_writes_each_format_alike():
 
 
 def test_an_output_can_be_replaced_and_is_readable():
-    """An earlier file is replaced; the new one has the rights any new file gets; a device is refused."""
+    """An earlier file is replaced; the new one has the rights any new file gets; links and pipes stay."""
     with tempfile.TemporaryDirectory() as folder:
         target = os.path.join(folder, "out.csv")
         for _ in range(2):
@@ -249,11 +249,24 @@ def test_an_output_can_be_replaced_and_is_readable():
         os.umask(mask)
         assert os.stat(target).st_mode & 0o777 == 0o666 & ~mask
         os.mkfifo(os.path.join(folder, "pipe.csv"))
-        code, _, errors = program.run("run", SPONGE, "-o", os.path.join(folder, "pipe.csv"))
-        assert code == 1 and "not a regular file" in errors, (code, errors)
+        with subprocess.Popen(["cmp", target, os.path.join(folder, "pipe.csv")]) as reader:
+            assert program.run("run", SPONGE, "-o", os.path.join(folder, "pipe.csv"))[0] == 0 and reader.wait(20) == 0
+        # A link stays, also a link to a link in another folder and one to a file that is missing.
+        os.mkdir(os.path.join(folder, "links"))
+        links = [os.path.join(folder, "links", name) for name in ("a.csv", "b.csv", "c.csv")]
+        for link, to in zip(links, ("../out.csv", "a.csv", "../new.csv")):
+            os.symlink(to, link)
+        for link, name in ((links[1], "out.csv"), (links[2], "new.csv")):
+            assert program.run("run", SPONGE, "--set", "duration=1", "-o", link)[0] == 0 and os.path.islink(link)
+            with open(os.path.join(folder, name), encoding="utf-8") as file:
+                assert len(file.readlines()) == 1002, name
+        assert all(map(os.path.islink, links))
+        assert program.run("examples", "chirp", "-o", "/dev/null") == (0, "", "")
+        for name in ("-", "/dev/stdout"):
+            assert program.run("examples", "chirp", "-o", name)[1].startswith("{"), name
         code, _, errors = program.run("run", SPONGE, "-o", os.path.join(folder, "none", "out.csv"))
         assert code == 1 and "No such file" in errors, (code, errors)
-        assert sorted(os.listdir(folder)) == ["out.csv", "pipe.csv"]
+        assert sorted(os.listdir(folder)) == ["links", "new.csv", "out.csv", "pipe.csv"]
 
 
 def test_bad_scenes_are_exit_code_3():
