@@ -261,6 +261,13 @@ static void report_put_notes(const ReportText *text, const Warnings *notes) {
                 notes->count - NOTES_SHOWN);
 }
 
+static void report_put_file(const ReportText *text, const char *path) {
+    char line[4100];
+    text_fit(line, sizeof line, path);
+    text_make_printable(line);
+    fprintf(text->file, "Wrote %s\n", line);
+}
+
 static void report_put(const ReportText *text, Report *report, const Texts *files) {
     if (report->title != NULL) {
         report_style(text, "1");
@@ -274,7 +281,7 @@ static void report_put(const ReportText *text, Report *report, const Texts *file
     report_put_notes(text, &report->notes);
     fputc('\n', text->file);
     for (size_t i = 0; i < files->count; i++)
-        fprintf(text->file, "Wrote %s\n", files->at[i]);
+        report_put_file(text, files->at[i]);
     if (report->next != NULL) {
         fputs("Next  ", text->file);
         report_style(text, "36");

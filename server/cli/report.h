@@ -75,6 +75,9 @@ void report_write_page(Report *report, const ReportPage *page, Bytes *bytes);
 
 void report_of_run(Report *report, const Simulation *simulation, const Outcome *outcome,
                    double seconds);
+// Of a scene without faults that has not been run.
+void report_of_check(Report *report, const StudyRequest *request, const PlanReport *plan,
+                     const Cost *cost);
 void report_of_study(Report *report, const Variant *answer, double seconds);
 
 #endif

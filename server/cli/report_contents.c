@@ -201,10 +201,20 @@ static const Impact *run_largest_impact(const Impacts *impacts) {
     return largest;
 }
 
+static void run_add_modes(PrintTable *table, const PlanModes *modes) {
+    Bytes text = {0};
+    for (size_t i = 0; i < modes->count && i < MODES_SHOWN; i++)
+        bytes_format(&text, "%s%.6g Hz (damping ratio %.3g)", i > 0 ? ", " : "",
+                     modes->at[i].frequency, modes->at[i].damping_ratio);
+    if (modes->count > MODES_SHOWN)
+        bytes_format(&text, ", and %zu more", modes->count - MODES_SHOWN);
+    if (modes->count > 0)
+        report_fact(table, modes->count > 1 ? "modes" : "mode", &text);
+}
+
 static void run_add_facts(Report *report, const Outcome *outcome, double duration) {
     const Response *response = &outcome->response;
     const Impact *largest = run_largest_impact(&response->impacts);
-    const PlanModes *modes = &outcome->plan.modes;
     const double force = outcome->summary.peak_contact_force;
     PrintTable *table = report_table(report, NULL, NULL);
     Bytes text = {0};
@@ -221,11 +231,7 @@ static void run_add_facts(Report *report, const Outcome *outcome, double duratio
         bytes_format(&text, " at %.6g s (damper %llu, %s)", largest->start,
                      (unsigned long long)largest->damper, side_names[largest->side]);
     report_fact(table, "impacts", &text);
-    for (size_t i = 0; i < modes->count && i < MODES_SHOWN; i++)
-        bytes_format(&text, "%s%.6g Hz (damping ratio %.3g)", i > 0 ? ", " : "",
-                     modes->at[i].frequency, modes->at[i].damping_ratio);
-    if (modes->count > 0)
-        report_fact(table, modes->count > 1 ? "modes" : "mode", &text);
+    run_add_modes(table, &outcome->plan.modes);
     if (isnan(outcome->summary.error_estimate))
         bytes_text(&text, "not estimated by this solver");
     else if (isnan(outcome->summary.trust_horizon))
@@ -344,6 +350,35 @@ void report_of_run(Report *report, const Simulation *simulation, const Outcome *
     if (report->is_page)
         run_add_details(report, simulation, outcome);
     report_notes(report, &outcome->warnings);
+}
+
+void report_of_check(Report *report, const StudyRequest *request, const PlanReport *plan,
+                     const Cost *cost) {
+    const Scene *scene = &request->simulation.scene;
+    char took[32];
+    const double megabytes = 1e-6 * cost->bytes;
+    report_sentence(report, "The scene has no faults: %.6g s at %.6g Hz, %zu samples%s%s.",
+                    scene->duration, scene->sample_rate, scene_sample_count(scene),
+                    request->study != NULL ? ", with the study " : "",
+                    request->study != NULL ? request->study->kind->name : "");
+    report_sentence(report, "Predicted cost: %s of CPU time, %.3g MB of memory.",
+                    report_seconds(took, cost->cpu_seconds), megabytes);
+    PrintTable *table = report_table(report, NULL, NULL);
+    for (size_t i = 0; i < plan->decisions.count; i++) {
+        const Decision *one = &plan->decisions.at[i];
+        char value[80] = "";
+        if (!isnan(one->value))
+            snprintf(value, sizeof value, " (%.6g%s%.40s)", one->value,
+                     one->unit != NULL ? " " : "", one->unit != NULL ? one->unit : "");
+        report_quantity(table, one->about, NULL);
+        print_table_add(table, "%s: %s%s", one->chose, one->why, value);
+    }
+    run_add_modes(table, &plan->modes);
+    list_add(report, plan_report_fields, plan,
+             &(ReportList){"derived", NULL,
+                           "damper|side|material|restitution=e|contact_time=T_c [s]|"
+                           "effective_mass=m_e [kg]|stiffness=k_b [N/m]|damping=c_b [N s/m]",
+                           NULL, false, 0});
 }
 
 // --- studies ---

@@ -41,8 +41,8 @@ static bool path_is_page(const char *path) {
 
 static void warnings_print(const char *path, const Warnings *warnings) {
     for (size_t i = 0; i < warnings->count; i++)
-        fprintf(stderr, "%s: warning: %s: %s\n", input_name(path), warnings->at[i].pointer,
-                warnings->at[i].detail);
+        command_print_line(stderr, "%s: warning: %s: %s", input_name(path), warnings->at[i].pointer,
+                           warnings->at[i].detail);
 }
 
 // Reads and resolves a scene. Both outputs are cleared in any case.
@@ -330,7 +330,7 @@ const Command command_run = {
 
 static const Field check_fields[] = {
     FIELD_FLAG(RunSettings, json, false,
-               "print the plan as JSON, as POST /v1/jobs?dry_run=1 answers"),
+               "print the plan as JSON, as POST /v1/jobs?dry_run=1 answers, also on a terminal"),
     SET_ROW(RunSettings),
     VARY_ROW(RunSettings),
     RECORD_ROWS(RunSettings),
@@ -338,24 +338,19 @@ static const Field check_fields[] = {
     FIELD_END,
 };
 
-// The plan as tables. The title, as all of it, is text of the file that must not control a
+// The plan for people. The title, as all of it, is text of the file that must not control a
 // terminal.
-static Status plan_print(const char *path, DryRun *run, const Bytes *json, Problem *problem) {
-    static const char *const skipped[] = {"scene", "dry_run", "cached", "links", NULL};
-    static const Field *const fields[] = {plan_report_fields, NULL};
-    static const PrintTableColumns lists[] = {
-        {"decisions", {"about", "chose", "value", "unit", "why"}}, {NULL, {NULL}}};
-    static const PrintTableView view = {skipped, lists, fields};
-    char *title = run->inquiry.simulation.title;
-    text_make_printable(title);
-    printf("%s: OK\n", input_name(path));
-    if (title != NULL)
-        printf("Title: %s\n", title);
-    if (run->inquiry.study != NULL)
-        printf("Study: %s\n", run->inquiry.study->kind->name);
-    putchar('\n');
-    const PrintTableForm form = {.has_colour = terminal_table_form().has_colour};
-    return print_table_print_json(json, &view, form, stdout, NULL, problem);
+static void plan_print(const char *path, const DryRun *run, const RunSettings *settings,
+                       const Terminal *terminal) {
+    Report report = {.is_page = false};
+    const StudyRequest *request = &run->inquiry;
+    report_title(&report, request->simulation.title);
+    report_of_check(&report, request, &run->plan, &run->cost);
+    report_notes(&report, &run->warnings);
+    if (settings->set.count + settings->vary.count + settings->record.count == 0)
+        report_next(&report, "impactd %s %s", request->study != NULL ? "study" : "run", path);
+    report_print(&report, terminal, &(Texts){.count = 0});
+    report_clear(&report);
 }
 
 static Status plan_show(const char *path, const Bytes *text, void *of, Problem *problem) {
@@ -366,6 +361,7 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
     JobManager *manager = NULL;
     DryRun run = {0};
     Bytes bytes = {0};
+    Terminal terminal;
     TRY(db_open(NULL, &db, problem));
     Status status = record_files_add(db, &(RecordFiles){asked->record, asked->unit}, problem);
     if (status == STATUS_OK)
@@ -376,10 +372,10 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
         job_json_put_dry_run(&bytes, &run);
     if (bytes.is_failed)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the plan");
-    else if (status == STATUS_OK && asked->json)
-        printf("%s\n", bytes.at);
+    else if (status == STATUS_OK && !asked->json && terminal_find(&terminal))
+        plan_print(path, &run, asked, &terminal);
     else if (status == STATUS_OK)
-        status = plan_print(path, &run, &bytes, problem);
+        printf("%s\n", bytes.at);
     bytes_clear(&bytes);
     dry_run_clear(&run);
     jobs_close(manager);
@@ -401,8 +397,9 @@ const Command command_check = {
             "  impactd check - < scene.json             # from standard input\n"
             "\n"
             "The plan has the choices of the program with their reasons, the stiffness and\n"
-            "damping of each stop, and the estimated cost. Nothing is run. Exit code 3 if the\n"
-            "scene has faults.\n",
+            "damping of each stop, and the estimated cost. Nothing is run. Where standard\n"
+            "output is no terminal, the plan is printed as JSON. Exit code 3 if the scene has\n"
+            "faults.\n",
     .options = check_fields,
     .size = sizeof(RunSettings),
     .run = check,

@@ -289,13 +289,13 @@ def test_bad_scenes_are_exit_code_3():
 
 
 def test_check_shows_the_plan():
-    """`check` names model, solver, stiffness and damping for people; --json is the dry run's shape."""
-    code, out, errors = program.run("check", SPONGE)
-    assert code == 0 and errors == ""
-    for part in ("spring_damper", "exact", "sponge@1", "stiffness [N/m]", "1655.62", "4.04574", "10001"):
+    """`check` shows choices, cost, stiffness and damping on a terminal; in a pipe and with --json it is the dry run's shape."""
+    code, out = program.on_terminal("check", scene=SPONGE)
+    assert code == 0 and "\nNext  impactd run " in out and max(map(len, out.splitlines())) <= 80, out
+    for part in ("no faults", "spring_damper", "exact", "sponge@1", "k_b [N/m]", "1655.62", "4.04574", "10001 samples", "MB of memory"):
         assert part in out, (part, out)
-    assert "\033" not in out
-    code, out, _ = program.run("check", SPONGE, "--json")
+    code, out, errors = program.run("check", SPONGE)
+    assert code == 0 and errors == "" and program.run("check", SPONGE, "--json")[1] == out
     plan = json.loads(out)
     assert code == 0 and plan["samples"] == 10001 and plan["cost"]["cpu_seconds"] > 0 and plan["cost"]["bytes"] > 0
     assert plan["plan"]["contact_model"] == "spring_damper" and plan["result"].startswith("r-")
@@ -306,8 +306,11 @@ def test_check_shows_the_plan():
 def test_a_scene_cannot_command_the_terminal():
     """`check` prints control characters of a title, of a key and of a value as question marks."""
     scene = {**program.scene("paper_free_sponge"), "title": "a\x1b[2Jb\x9bc\nd"}
-    code, out, errors = program.run("check", "-", text=json.dumps(scene))
-    assert code == 0 and "Title: a?[2Jb??c?d\n" in out and errors == "", (code, out, errors)
+    code, out = program.on_terminal("check", scene=scene)
+    assert code == 0 and out.startswith("a?[2Jb??c?d\n"), (code, out)
+    with tempfile.TemporaryDirectory() as folder:
+        code, out = program.on_terminal("run", SPONGE, "-o", os.path.join(folder, "\x1b[2Jx.csv"))
+        assert code == 0 and "/?[2Jx.csv" in out and "\x1b" not in out, (code, out)
     scene = {**scene, "k\x1b[31m": 1, "contact": {"model": "x\x1b[0m"}}
     code, out, errors = program.run("check", "-", text=json.dumps(scene))
     assert code == 3 and "/k?[31m: unknown key" in errors and "\x1b" not in errors, (code, errors)
