@@ -52,6 +52,7 @@ static const struct {
     {".css", "text/css; charset=utf-8"},
     {".json", type_json},
     {".svg", "image/svg+xml"},
+    {".woff2", "font/woff2"},
     {".png", "image/png"},
     {".py", "text/x-python; charset=utf-8"},
     {".m", "text/x-matlab; charset=utf-8"},

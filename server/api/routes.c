@@ -126,7 +126,7 @@ const Route routes[] = {
     {"GET",    "/health/ready",                         "open",   NULL,         "The daemon accepts jobs; 503 otherwise", health_ready, request_is_empty},
     {"GET",    "/metrics",                              "read",   NULL,         "Counters in the Prometheus text format", metrics_show, NULL},
     {"GET",    "/version",                              "open",   NULL,         "Program, engine and build", version_show, request_is_empty},
-    {"GET",    "/web/vendor/{library}/{file}",          "open",   NULL,         "A file of the dashboard", assets_show, NULL},
+    {"GET",    "/web/{folder}/{part}/{file}",           "open",   NULL,         "A file of the dashboard", assets_show, NULL},
     {"GET",    "/web/{folder}/{file}",                  "open",   NULL,         "A file of the dashboard", assets_show, NULL},
     {"GET",    "/web/{file}",                           "open",   NULL,         "A file of the dashboard", assets_show, NULL},
     {"GET",    "/guide/{file}",                         "open",   NULL,         "A page or a picture of the guide", guide_show, NULL},

@@ -4,7 +4,7 @@ import { leads, says, tabTo, test, until } from "./support.mjs";
 
 const player = (page) => page.getByRole("group", { name: "Player" });
 const instant = (page) => player(page).getByRole("slider", { name: "Instant" });
-const click = (page, name) => page.getByRole("region", { name: "Impacts" }).getByRole("button", { name }).click();
+const click = (page, name) => page.getByRole("region", { name: "Selected impact" }).getByRole("button", { name }).click();
 const at = (page) => Number(new URL(page.url().replace("#/", "")).searchParams.get("t"));
 
 test("The player follows from impact to impact and shows what the series holds", async ({ page, daemon, url }) => {
@@ -17,11 +17,11 @@ test("The player follows from impact to impact and shows what the series holds",
     const [value] = channels[name].values, shown = (name === "displacement" ? value * 1e3 : value).toPrecision(3);
     assert.ok(read.includes(shown.replace(/\.?0+$/, "")), `${shown} is not in ${read}`);
   }
-  await click(page, "Next");
+  await click(page, "Next impact");
   await leads(page, /impact=2\b/);
   await until("its instant", async () => Math.abs(at(page) - impacts[1].start) < 1e-9);
   await says(player(page), /−7.5 mm/); // at the left stop of a clearance of 15 mm
-  await click(page, "Previous");
+  await click(page, "Previous impact");
   await leads(page, /impact=1\b/);
   await says(player(page), new RegExp(impacts[0].start.toFixed(5)));
   await page.goBack();

@@ -37,10 +37,12 @@ test("A study's chart opened by itself has its colours, light and dark", async (
 
 test("Below a study stands the scene's own run", async ({ page, daemon, url }) => {
   await open(page, daemon, url, "compare_sponge");
-  assert.equal(await page.getByRole("region", { name: "Summary" }).count(), 0);
+  assert.equal(await page.getByRole("region", { name: "Motion over time" }).count(), 0);
   await page.getByText("The run of the unchanged scene").click();
-  await says(page.getByRole("region", { name: "Summary" }), /Impacts\s+22[^]*10 s of motion, 22 contacts and 10001 samples\./);
-  await says(page.getByRole("region", { name: "Motion over time" }), /no peak is lost/);
+  await says(page.getByRole("main"), /Impacts[^]*22[^]*Largest force/);
+  await says(page.getByRole("region", { name: "Motion over time" }), /almost all of the motion/);
+  await page.getByRole("tab", { name: "How it was computed" }).click();
+  await says(page.getByRole("tabpanel"), /10 s of motion, 22 contacts and 10001 samples\./);
 });
 
 test("A sweep's map by keyboard, and its URL gives the same point again", async ({ page, daemon, url, newPage }) => {

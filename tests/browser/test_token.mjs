@@ -23,6 +23,7 @@ test("A service with tokens asks for one, refuses a wrong one, works with a righ
   await dialog.getByLabel("Token").fill(right);
   await dialog.getByRole("button", { name: "Use it" }).click();
   await says(page.getByRole("heading", { level: 1 }), /sponge/);
+  await page.getByRole("tab", { name: "Files and code" }).click();
   const saving = page.waitForEvent("download");
   await page.getByRole("link", { name: "impacts.csv" }).click();
   assert.match(fs.readFileSync(await (await saving).path(), "utf8"), /approach/);

@@ -22,7 +22,7 @@ SCENE = program.scene("paper_free_sponge")
 
 # What needs no token: what the API is, whether there is a daemon, the page that asks for a token and what it is made of.
 OPEN = ["/schemas", "/schemas/{name}", "/openapi.json", "/health/live", "/health/ready", "/version",
-        "/web/vendor/{library}/{file}", "/web/{folder}/{file}", "/web/{file}", "/guide/{file}", "/guide/", "/problems/{name}",
+        "/web/{folder}/{part}/{file}", "/web/{folder}/{file}", "/web/{file}", "/guide/{file}", "/guide/", "/problems/{name}",
         "/client/impactd", "/client/{file}", "/client", "/favicon.ico", "/"]
 
 

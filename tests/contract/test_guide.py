@@ -109,9 +109,13 @@ def test_every_type_of_problem_has_its_section():
 def test_every_question_mark_of_the_dashboard_leads_to_a_section():
     """The places of js/help.js and the pages of studies exist, and the header of the dashboard has the guide."""
     places = re.findall(r'"?: "([\w-]+)(?:#([\w-]+))?"', read("web", "js", "help.js"))
-    kinds = re.findall(r'^  ?"?(\w+)"?:|[ ,](\w+): "', re.search(r"const STUDIES = \{(.*?)\};", read("web", "js", "result_page.js"), re.S)[1])
-    places += [(f"study-{one or two}", "") for one, two in kinds]
-    assert len(places) > 25, places
+    kinds = re.findall(r"^  (\w+): \{", re.search(r"const STUDIES = \{(.*?)\n\};", read("web", "js", "result", "page.js"), re.S)[1], re.M)
+    assert len(kinds) == 9, kinds
+    places += [(f"study-{kind}", "") for kind in kinds]
+    for folder, _, files in os.walk(os.path.join(program.SOURCE, "web", "js")):
+        for file in files:
+            places += re.findall(r'"([a-z-]+)#([a-z-]+)"', read(folder, file))
+    assert len(places) > 38, places
     with program.daemon() as daemon:
         served = {name: Page(daemon.get(f"/guide/{name}.html").body.decode()).ids for name in pages()}
     for name, anchor in places:

@@ -86,13 +86,50 @@ def json_prose(path, node, place=""):
             yield from json_prose(path, value, f"{place}/{index}")
 
 
+def template(text, at):
+    """The template whose text begins at `at`: its text with "X" for each expression, literals within these, its end."""
+    parts, inner = [], []
+    while at < len(text) and text[at] != "`":
+        if text.startswith("${", at):
+            found, at = literals(text, at + 2, "}")
+            inner += found
+            parts.append("X")
+        else:
+            width = 2 if text[at] == "\\" else 1
+            parts.append(text[at:at + width])
+            at += width
+    return "".join(parts), inner, at + 1
+
+
+def literals(text, at=0, end=None):
+    """Quoted texts and templates of a script as (offset, text), comments left out, up to a bracket `end`; and where that is."""
+    found, depth = [], 0
+    while at < len(text):
+        comment = re.compile(r"//[^\n]*|/\*.*?\*/", re.S).match(text, at)
+        quoted = re.compile(r'"((?:[^"\\\n]|\\.)*)"').match(text, at)
+        if comment:
+            at = comment.end()
+        elif quoted:
+            found.append((at, quoted.group(1)))
+            at = quoted.end()
+        elif text[at] == "`":
+            literal, inner, after = template(text, at + 1)
+            found += [(at, literal), *inner]
+            at = after
+        elif end is not None and text[at] == end and depth == 0:
+            return found, at + 1
+        else:
+            depth += {"{": 1, "}": -1}.get(text[at], 0)
+            at += 1
+    return found, at
+
+
 def script_prose(path, text):
-    """The quoted texts of a script, its comments left out; an expression within a template is one word."""
-    for found in re.finditer(r'//[^\n]*|/\*.*?\*/|"((?:[^"\\\n]|\\.)*)"|`((?:[^`\\]|\\.)*)`', text, re.S):
-        literal = found.group(1) or found.group(2) or ""
-        literal = re.sub(r"\$\{(?:[^{}]|\{[^{}]*\})*\}", "X", literal)
-        if " " in literal.strip() and "<" not in literal:
-            yield f"{path}:{lines_before(text, found.start())}", literal
+    """The quoted texts of a script and those between the tags of its markup; an expression within a template is one word."""
+    for offset, literal in literals(text)[0]:
+        for part in re.split(r"<[^<>]*>", re.sub(r"=>", "", literal)) if "<" in literal else [literal]:
+            if " " in part.strip():
+                yield f"{path}:{lines_before(text, offset)}", part
 
 
 def html_prose(path, text):

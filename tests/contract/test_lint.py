@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""A linter of OpenAPI 3.1 finds no error in schema/openapi.json.
+"""A linter of OpenAPI 3.1 finds no error in schema/openapi.json, and the dashboard is written as prettier writes it.
 
-@redocly/cli is installed by npm into the build folder, once; without npm or its network the test is skipped."""
+Both are installed by npm into the build folder, once; without npm or its network the tests are skipped."""
 
 import json
 import os
@@ -15,6 +15,7 @@ import program  # noqa: E402
 WAITS = True  # for npm's network
 
 LINTER = "@redocly/cli@1.34.5"
+FORMATTER = "prettier@3.10.1"
 
 # Warnings that are meant to be there: rule -> why.
 EXPECTED = {
@@ -25,19 +26,20 @@ EXPECTED = {
 }
 
 
-def linter():
+def installed(package, name):
+    """The path of a program of npm."""
     folder = os.path.join(program.build, "node")
-    path = os.path.join(folder, "node_modules", ".bin", "redocly")
+    path = os.path.join(folder, "node_modules", ".bin", name)
     if os.path.exists(path):
         return path
     if shutil.which("npm") is None:
         raise program.Skipped("npm is not here (Debian packages nodejs and npm)")
     os.makedirs(folder, exist_ok=True)
     done = subprocess.run(["npm", "install", "--no-save", "--no-package-lock", "--no-audit", "--no-fund",
-                           "--omit-lockfile-registry-resolved", "--loglevel=error", LINTER],
+                           "--omit-lockfile-registry-resolved", "--loglevel=error", LINTER, FORMATTER],
                           cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     if done.returncode != 0:
-        raise program.Skipped(f"npm cannot install {LINTER}: {done.stderr.strip().splitlines()[-1:]}")
+        raise program.Skipped(f"npm cannot install {package}: {done.stderr.strip().splitlines()[-1:]}")
     return path
 
 
@@ -52,7 +54,7 @@ def lint(document):
             text = text.replace(f'"/schemas/{name.split(".")[0]}"', f'"./{name}"')
     with open(os.path.join(folder, "openapi.json"), "w", encoding="utf-8") as file:
         file.write(text)
-    done = subprocess.run([linter(), "lint", "--format=json", "--extends=recommended", "--max-problems=1000", "openapi.json"],
+    done = subprocess.run([installed(LINTER, "redocly"), "lint", "--format=json", "--extends=recommended", "--max-problems=1000", "openapi.json"],
                           cwd=folder, capture_output=True, text=True, timeout=200, check=False,
                           env={**os.environ, "REDOCLY_TELEMETRY": "off", "CI": "1"})
     assert done.stdout.startswith("{"), done
@@ -66,20 +68,30 @@ def document():
 
 def test_the_linter_finds_no_error():
     """Nothing but what is expected."""
-    linter()
+    installed(LINTER, "redocly")
     found = [one for one in lint(document()) if one[1] not in EXPECTED]
     assert not found, "\n".join(map(str, found))
 
 
 def test_the_linter_finds_planted_faults():
     """A reference that leads nowhere, an operation id used twice and a path without its parameter are found."""
-    linter()
+    installed(LINTER, "redocly")
     broken = document()
     broken["paths"]["/v1/jobs"]["get"]["operationId"] = broken["paths"]["/version"]["get"]["operationId"]
     broken["paths"]["/v1/jobs/{id}"]["get"]["parameters"] = []
     broken["paths"]["/version"]["get"]["responses"]["200"]["content"]["application/json"]["schema"]["$ref"] += "x"
     rules = {rule for severity, rule, _ in lint(broken) if severity == "error"}
     assert rules >= {"operation-operationId-unique", "path-parameters-defined", "no-unresolved-refs"}, rules
+
+
+def test_the_dashboard_is_formatted():
+    """Every module in a folder of web/js is as prettier formats it, in 100 columns (web/.prettierrc.json)."""
+    folder = os.path.join(program.SOURCE, "web", "js")
+    parts = sorted(name for name in os.listdir(folder) if os.path.isdir(os.path.join(folder, name)))
+    assert len(parts) > 2, parts
+    done = subprocess.run([installed(FORMATTER, "prettier"), "--check", *parts], cwd=folder, capture_output=True, text=True,
+                          timeout=200, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 if __name__ == "__main__":

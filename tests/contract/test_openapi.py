@@ -155,7 +155,7 @@ def test_real_answers_have_the_promised_shapes():
                   "/v1/examples/{name}": {"name": "paper_free_sponge"}, "/schemas/{name}": {"name": "scene"},
                   "/client/{file}": {"file": "impactd.py"}, "/web/{file}": {"file": "style.css"}, "/web/{folder}/{file}": {"folder": "js", "file": "main.js"},
                   "/guide/{file}": {"file": "problems.html"}, "/problems/{name}": {"name": "not-found"},
-                  "/web/vendor/{library}/{file}": {"library": "uplot", "file": "uPlot.esm.js"}}
+                  "/web/{folder}/{part}/{file}": {"folder": "vendor", "part": "htm", "file": "standalone.module.js"}}
 
         def call(method, path, target, **options):
             reply = daemon.request(method, target, **options)

@@ -1,5 +1,6 @@
 // The service over HTTP: the one place that fetches. Paths of our own are written without a slash ("v1/jobs"), those of
 // answers' links as they came.
+import { createStore } from "./ui/store.js";
 
 // What a problem document says (RFC 9457), or that nobody answered (status 0).
 class Refusal extends Error {
@@ -13,6 +14,7 @@ const KEY = "impactd.token";
 let signIn = null; // () -> a promise of whether there is a token now
 export const token = () => sessionStorage.getItem(KEY);
 export const setToken = (text) => sessionStorage.setItem(KEY, text);
+export const session = createStore(0); // counts tokens given by hand: what was refused before is tried again
 export const onUnauthorised = (asks) => (signIn = asks);
 
 const home = new URL(".", document.baseURI);

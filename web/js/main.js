@@ -1,6 +1,6 @@
 // Which page is shown, and what stands around it: navigation, theme, token.
 import { read } from "./address.js";
-import { get, onUnauthorised, readUntil, setToken, token } from "./api.js";
+import { get, onUnauthorised, readUntil, session, setToken, token } from "./api.js";
 import { failure, fill, h, once, tell } from "./dom.js";
 import { themed } from "./theme.js";
 
@@ -8,6 +8,7 @@ import { themed } from "./theme.js";
 // for a new query on the same path (false: show it anew), and for the end, when `signal` is aborted.
 // "materials" is in materials_page.js, "materials/felt" in material_page.js, "materials/felt/measure" in measure_page.js.
 const pages = ["scene", "jobs", "job", "result", "compare", "materials", "material", "measure", "records", "record", "shell"];
+const views = { result: () => import("./result/page.js") };
 
 const [main, tokenButton, skip, version] = ["main", "token", "skip", "version"].map((id) => document.getElementById(id));
 let shown = null; // {path, stop, controller: promise}
@@ -33,7 +34,7 @@ async function open(address, path, signal, last) {
     anchor.ariaCurrent = anchor.hash === `#/${first === "results" ? "jobs" : first}` ? "page" : null;
   try {
     if (!pages.includes(name)) throw new Error(`There is no page "${path}" here.`);
-    const { page } = await import(`./${name}_page.js`);
+    const { page } = await (views[name]?.() ?? import(`./${name}_page.js`));
     if (signal.aborted) return null;
     const title = page.title(address), host = h("div.page", null, "Loading …");
     document.title = `${title} · impactd`;
@@ -73,7 +74,7 @@ const askToken = once(() => new Promise((resolve) => {
 }));
 onUnauthorised(askToken);
 tokenButton.hidden = !token();
-tokenButton.onclick = () => askToken().then(show);
+tokenButton.onclick = () => askToken().then(() => session.set((count) => count + 1)).then(show);
 
 skip.onclick = (event) => {
   event.preventDefault();

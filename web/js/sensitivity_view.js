@@ -2,7 +2,7 @@
 import { table } from "./dom.js";
 import { plot } from "./plot.js";
 import { between, lesson, spectrum, spread } from "./study_bits.js";
-import { share } from "./summary_view.js";
+import { share } from "./result/headlines.js";
 import { number, quantity, title, words } from "./units.js";
 
 export function show(host, { result: { study } }) {

@@ -1,21 +1,53 @@
 // What a reader takes along: files in every format, and lines that run this scene elsewhere.
-import { address, save } from "./api.js";
-import { copied, failure, figures, folded, h } from "./dom.js";
-import { title } from "./units.js";
+import { html } from "../ui/preact.js";
+import { address, save } from "../api.js";
+import { CopyButton } from "../ui/controls.js";
+import { title } from "../units.js";
+import { useResult } from "./context.js";
 
-export const section = { title: "Take it along", show };
+// Links of the answer by what they hold: Map of "series" to [{path, name, format}].
+function filesOf(links) {
+  const files = Object.values(links)
+    .map((path) => /^[^{]+\/((\w+)\.(\w+))$/.exec(path))
+    .filter(Boolean)
+    .map(([path, name, part, format]) => ({ path, name, part, format }));
+  return Map.groupBy(files, ({ part }) => part);
+}
 
-function show(host, { result: { id, links, scene } }) {
-  const files = Map.groupBy(Object.values(links).map((path) => /^[^{]+\/((\w+)\.(\w+))$/.exec(path)).filter(Boolean),
-    ([, , what]) => what);
-  const file = ([path, name, , format]) => [h("a", { href: address(path), "aria-label": name, onclick(event) {
-    event.preventDefault();
-    save(path, `${id.slice(0, 10)}_${name}`).catch((error) => event.target.after(failure(error)));
-  } }, format), " "];
+export function Files() {
+  const { result } = useResult();
+  const { id, links, scene } = result;
   // Apostrophes, which only stand in texts, are escaped: so any language can quote it.
-  const text = JSON.stringify(scene, null, 2).replaceAll("'", "\\u0027"), url = address("").replace(/\/$/, "");
-  host.append(figures([...files].map(([what, all]) => [title(what), all.map(file)])), ...Object.entries(languages(url, text)).map(([name, lines]) =>
-    folded(`Run this scene from ${name}`, () => copied(lines))));
+  const text = JSON.stringify(scene, null, 2).replaceAll("'", "\\u0027");
+  const url = address("").replace(/\/$/, "");
+  const take = (file) => async (event) => {
+    event.preventDefault();
+    await save(file.path, `${id.slice(0, 10)}_${file.name}`);
+  };
+  return html`<dl class="figures">
+      ${[...filesOf(links)].map(
+        ([part, files]) =>
+          html`<div>
+            <dt>${title(part)}</dt>
+            <dd>
+              ${files.map(
+                (file) =>
+                  html`<a href=${address(file.path)} aria-label=${file.name} onClick=${take(file)}
+                      >${file.format}</a
+                    >${" "}`,
+              )}
+            </dd>
+          </div>`,
+      )}
+    </dl>
+    ${Object.entries(languages(url, text)).map(
+      ([name, lines]) =>
+        html`<details>
+          <summary>Run this scene from ${name}</summary>
+          <${CopyButton} text=${lines} />
+          <pre tabindex="0">${lines}</pre>
+        </details>`,
+    )}`;
 }
 
 const languages = (url, scene) => ({

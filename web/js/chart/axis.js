@@ -1,0 +1,66 @@
+// The frame of a chart: grid, ticks and their numbers, in the unit that suits the axis.
+import { html } from "../ui/preact.js";
+import { number, pretty, scale as unitScale } from "../units.js";
+import { ticksOf } from "./scale.js";
+
+// {factor, unit, title} of an axis {label, unit}: numbers are divided by `factor` and shown in `unit`.
+export function axisUnit(axis, domain) {
+  const size = Math.max(Math.abs(domain[0]), Math.abs(domain[1]));
+  let factor = 1;
+  let unit = axis.unit === "1" ? "" : (axis.unit ?? "");
+  if (!axis.log && size > 0) {
+    [factor, unit] = unitScale(size, unit);
+    if (factor === 1 && (size < 0.01 || size >= 1e5)) {
+      const power = 3 * Math.floor(Math.log10(size) / 3);
+      factor = 10 ** power;
+      unit = `10^${power} ${unit}`.trim();
+    }
+  }
+  return { factor, unit, title: unit ? `${axis.label} [${pretty(unit)}]` : axis.label };
+}
+
+const tickText = (value, factor, isLog) =>
+  isLog
+    ? number(value, 2).replace(/^1 × /, "")
+    : number(Number((value / factor).toPrecision(9)), 9);
+
+// A category axis has `categories`: texts at 0, 1, 2, …
+function ticksFor(axis, scale, most) {
+  if (!axis.categories) return ticksOf(scale, most);
+  const every = Math.max(1, Math.ceil(axis.categories.length / most));
+  return axis.categories.map((_, index) => index).filter((index) => index % every === 0);
+}
+
+export function XAxis({ axis, scale, top, bottom, isCompact }) {
+  const [left, right] = scale.pixels;
+  const { factor } = axisUnit(axis, scale.domain);
+  const ticks = ticksFor(axis, scale, Math.max(2, (right - left) / (axis.categories ? 90 : 80)));
+  return html`<g class="axis">
+    ${ticks.map((value) => {
+      const x = Math.round(scale.to(value)) + 0.5;
+      const text = axis.categories ? axis.categories[value] : tickText(value, factor, axis.log);
+      return html`<g>
+        <line x1=${x} x2=${x} y1=${top} y2=${bottom} class="grid" />
+        ${!isCompact && html`<text x=${x} y=${bottom + 15} text-anchor="middle">${text}</text>`}
+      </g>`;
+    })}
+    <line x1=${left} x2=${right} y1=${bottom + 0.5} y2=${bottom + 0.5} class="frame" />
+  </g>`;
+}
+
+export function YAxis({ axis, scale, left, right }) {
+  const [bottom, top] = scale.pixels;
+  const { factor } = axisUnit(axis, scale.domain);
+  const ticks = ticksFor(axis, scale, Math.max(2, (bottom - top) / (axis.categories ? 18 : 34)));
+  return html`<g class="axis">
+    ${ticks.map((value) => {
+      const y = Math.round(scale.to(value)) + 0.5;
+      const text = axis.categories ? axis.categories[value] : tickText(value, factor, axis.log);
+      const isZero = value === 0 && !axis.categories;
+      return html`<g>
+        <line x1=${left} x2=${right} y1=${y} y2=${y} class=${isZero ? "grid zero" : "grid"} />
+        <text x=${left - 6} y=${y + 4} text-anchor="end">${text}</text>
+      </g>`;
+    })}
+  </g>`;
+}

@@ -1,0 +1,193 @@
+// One chart: series over one axis, with marks of events, shaded spans, rules, zoom, a cursor with a tooltip, a legend that
+// hides and isolates, its picture and its numbers to take along. Everything is SVG: the page's style colours it.
+import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { announce } from "../ui/announce.js";
+import { freshId } from "../ui/ids.js";
+import { quantity } from "../units.js";
+import { axisUnit, XAxis, YAxis } from "./axis.js";
+import { Cursor, cursorOf } from "./cursor.js";
+import { ChartTools, DataTable } from "./export.js";
+import { handleKey, handlePointers } from "./input.js";
+import { Legend } from "./legend.js";
+import { Markers, Rules, Spans } from "./marks.js";
+import { extentOf, linearScale, logScale, paddedDomain } from "./scale.js";
+import { drawSeries, valuesInView } from "./series.js";
+
+export const MARGIN = { left: 58, right: 14, top: 8, bottom: 22, marks: 14 };
+
+// The pixels that an element is wide; it is drawn again when they change.
+function useWidth(ref) {
+  const [width, setWidth] = useState(0);
+  useLayoutEffect(() => {
+    const measure = () => setWidth(Math.round(ref.current?.clientWidth ?? 0));
+    measure();
+    const observer = new ResizeObserver(measure);
+    observer.observe(ref.current);
+    return () => observer.disconnect();
+  }, []);
+  return width;
+}
+
+// The ends of what a series covers: bars reach half their width beyond their places.
+function placesOf({ kind, x, width }) {
+  if (kind !== "bars" || x.length === 0) return x;
+  const half = (width.at?.(0) ?? width) / 2;
+  return [x[0] - half, x[x.length - 1] + half];
+}
+
+function wholeDomain(x, series) {
+  if (x.domain) return x.domain;
+  if (x.categories) return [-0.5, x.categories.length - 0.5];
+  const hasPoints = series.some((one) => one.kind === "points");
+  return paddedDomain(extentOf(series.map(placesOf), x.log), x.log, hasPoints ? 0.04 : 0);
+}
+
+function valueDomain(y, series, rules, domain) {
+  if (y.domain) return y.domain;
+  if (y.categories) return [y.categories.length - 0.5, -0.5];
+  const arrays = series.flatMap((one) => valuesInView(one, domain));
+  arrays.push(rules.filter((rule) => rule.y !== undefined).map((rule) => rule.y));
+  if (y.includeZero || (!y.log && series.some((one) => one.kind === "bars"))) arrays.push([0]);
+  return paddedDomain(extentOf(arrays, y.log), y.log);
+}
+
+// Chart({title, description, x, y, series, …}):
+//   title, description   a heading; a sentence on what is seen, for those who do not see it
+//   x, y                 {label, unit, log, domain, categories}: without `domain` what the values need
+//   series               [{kind, label, unit, color, x, y, …}], see series.js; `x` and `y` are arrays that nobody changes
+//   spans, rules, markers  [{from, to, label}]; [{x or y, label, color}]; [{x, label, color, onPick}]
+//   height               of the plot, in pixels
+//   range, onRange       the part of x in view, null for all; without onRange the chart keeps it
+//   group                charts of one group share the cursor
+//   onPick               called with (series, index) of the point that was clicked
+//   isCompact            the numbers of x are left out: another chart stands below
+//   underlay, children   further SVG below and above the series, from the plot {x, y, left, right, top, bottom}: scales, pixels
+export function Chart(props) {
+  const { title, description, x, y, height = 200, isCompact = false } = props;
+  const { spans = [], rules = [], markers = [], underlay, children } = props;
+  const id = useMemo(() => freshId("chart"), []);
+  const box = useRef(null);
+  const svg = useRef(null);
+  const width = useWidth(box);
+  const [hidden, setHidden] = useState(new Set());
+  const [hasNumbers, setHasNumbers] = useState(false);
+  const [ownRange, setOwnRange] = useState(null);
+
+  const series = props.series.filter((one) => !hidden.has(one.label));
+  const whole = wholeDomain(x, props.series);
+  const range = (props.onRange ? props.range : ownRange) ?? null;
+  const domain = range ?? whole;
+  const top = MARGIN.top + (markers.length > 0 ? MARGIN.marks : 0);
+  const bottom = top + height;
+  const outerHeight = bottom + (isCompact ? 6 : MARGIN.bottom);
+  const left = y.categories ? Math.min(180, width * 0.4) : MARGIN.left;
+  const right = Math.max(left + 20, width - MARGIN.right);
+  const makeX = x.log ? logScale : linearScale;
+  const makeY = y.log ? logScale : linearScale;
+  const xScale = makeX(domain, [left, right]);
+  const yScale = makeY(valueDomain(y, series, rules, domain), [bottom, top]);
+  const density = Math.max(1, globalThis.devicePixelRatio ?? 1);
+  const cursor = cursorOf(props.group ?? id);
+
+  const setRange = (next) => {
+    const isWhole = next === null || (next[0] <= whole[0] && next[1] >= whole[1]);
+    const chosen = isWhole ? null : [Math.max(next[0], whole[0]), Math.min(next[1], whole[1])];
+    if (props.onRange) props.onRange(chosen);
+    else setOwnRange(chosen);
+  };
+  const { onPick } = props;
+  const axes = { x, y };
+  const state = {
+    id,
+    series,
+    markers,
+    axes,
+    xScale,
+    yScale,
+    whole,
+    domain,
+    cursor,
+    setRange,
+    announce,
+    onPick,
+  };
+  const latest = useRef(state);
+  latest.current = state;
+  useLayoutEffect(() => handlePointers(box.current, svg.current, latest), []);
+
+  const xTitle = axisUnit(x, domain).title;
+  const yTitle = axisUnit({ ...y, label: y.label ?? title }, yScale.domain).title;
+  const plot = { x: xScale, y: yScale, left, right, top, bottom };
+  const summary = description ?? describe(props.series, x, y, domain);
+  return html`<figure class="chart" aria-label=${title}>
+    <div class="chart-head">
+      <h3>${y.categories ? title : yTitle}</h3>
+      ${
+        props.series.length > 1 &&
+        html`<${Legend} series=${props.series} hidden=${hidden} setHidden=${setHidden} />`
+      }
+      <${ChartTools}
+        title=${title}
+        heading=${`${yTitle} over ${xTitle}`}
+        series=${series}
+        svg=${svg}
+        isZoomed=${range !== null}
+        onWhole=${() => setRange(null)}
+        hasNumbers=${hasNumbers}
+        onNumbers=${() => setHasNumbers(!hasNumbers)}
+      />
+    </div>
+    <div
+      class="plot"
+      ref=${box}
+      tabindex="0"
+      role="application"
+      aria-label=${title}
+      aria-describedby=${`${id}-summary`}
+      onKeyDown=${(event) => handleKey(event, latest.current)}
+    >
+      <svg ref=${svg} width=${width} height=${outerHeight} aria-hidden="true">
+        <defs>
+          <clipPath id=${`${id}-clip`}>
+            <rect x=${left} y=${top - 1} width=${right - left} height=${height + 2} />
+          </clipPath>
+        </defs>
+        <${Spans} spans=${spans} plot=${plot} />
+        ${width > 0 && underlay?.(plot)}
+        <${YAxis} axis=${y} scale=${yScale} left=${left} right=${right} />
+        <${XAxis} axis=${x} scale=${xScale} top=${top} bottom=${bottom} isCompact=${isCompact} />
+        <g clip-path=${`url(#${id}-clip)`}>
+          ${width > 0 && series.map((one) => drawSeries(one, xScale, yScale, density))}
+          ${children?.(plot)}
+        </g>
+        <${Rules} rules=${rules} plot=${plot} />
+        <${Markers} markers=${markers} plot=${plot} />
+      </svg>
+      <${Cursor}
+        id=${id}
+        cursor=${cursor}
+        series=${series}
+        markers=${markers}
+        plot=${plot}
+        x=${x}
+        y=${y}
+      />
+    </div>
+    ${!isCompact && html`<p class="x-title" aria-hidden="true">${xTitle}</p>`}
+    <p class="visually-hidden" id=${`${id}-summary`}>${summary}</p>
+    ${hasNumbers && html`<${DataTable} title=${title} series=${props.series} x=${x} y=${y} />`}
+  </figure>`;
+}
+
+// A sentence with the ranges of what is shown.
+function describe(series, x, y, domain) {
+  const span = `${x.label} from ${quantity(domain[0], x.unit)} to ${quantity(domain[1], x.unit)}`;
+  const parts = series.map((one) => {
+    const extent = extentOf(valuesInView(one, domain));
+    const unit = one.unit ?? y.unit;
+    return extent
+      ? `${one.label} between ${quantity(extent[0], unit)} and ${quantity(extent[1], unit)}`
+      : `${one.label} has no values`;
+  });
+  return `${[span, ...parts].join("; ")}.`;
+}

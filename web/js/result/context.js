@@ -1,0 +1,31 @@
+// What all parts of a result's page share: the result, its impacts, the view that the address holds, and how to change it.
+import { createContext, useContext } from "../ui/preact.js";
+
+export const ResultContext = createContext(null);
+export const useResult = () => useContext(ResultContext);
+
+// The window of time in view: {from, to, end}; the whole unless the query says otherwise.
+export function windowOf(result, query) {
+  const end = (result.count - 1) / result.sample_rate;
+  const within = (text, initial) => {
+    const value = text === undefined || text === "" ? initial : Number(text);
+    return Math.min(end, Math.max(0, Number.isFinite(value) ? value : initial));
+  };
+  const from = within(query.from, 0);
+  const to = within(query.to, end);
+  return from < to ? { from, to, end } : { from: 0, to: end, end };
+}
+
+// Names of channels: with several storeys or dampers each has its number.
+export function channelNames({ scene, channels }) {
+  const storeys = [scene.structure.masses ?? scene.structure.mass].flat().length;
+  const { dampers } = scene;
+  const isNumbered = storeys > 1 || dampers.length > 1;
+  const name = (word, number) => (isNumbered ? `${word}_${number}` : word);
+  return {
+    storeys,
+    has: (channel) => channels.includes(channel),
+    ofStorey: (word, number) => name(word, number),
+    ofDamper: (word, number) => name(word, number),
+  };
+}

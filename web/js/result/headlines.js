@@ -1,0 +1,83 @@
+// The six numbers that a result is opened for: the damper's effect, impacts, the largest force, how exact it is.
+import { html } from "../ui/preact.js";
+import { Headlines } from "../ui/controls.js";
+import { number, quantity } from "../units.js";
+import { useResult } from "./context.js";
+
+// "12.3 %"; what is next to nothing as a power of ten.
+export const share = (part, digits = 3) =>
+  part !== 0 && Math.abs(part) < 1e-5 ? `${number(part, 2)}` : `${number(100 * part, digits)} %`;
+
+// A metric with and without the damper: reductions are relative to the structure alone.
+function effect(label, summary, units, name, place) {
+  const value = summary[name];
+  const reduction = summary[`${name}_reduction`];
+  if (value === null || value === undefined) return null;
+  if (reduction === null || reduction === undefined)
+    return { label, value: quantity(value, units[name]), place };
+  const without = reduction < 1 ? quantity(value / (1 - reduction), units[name], 3) : "–";
+  const isLess = reduction > 0.0005;
+  const isMore = reduction < -0.0005;
+  const change = `${isMore ? "+" : "−"}${number(Math.abs(100 * reduction), 3)} %`;
+  return {
+    label,
+    value: isLess || isMore ? change : "no change",
+    note: `${quantity(value, units[name], 3)}, bare ${without}`,
+    tone: (isLess && "good") || (isMore && "worse") || "",
+    place,
+  };
+}
+
+function accuracy({ error_estimate: error, trust_horizon: horizon }) {
+  const place = "concepts#error-estimate";
+  const hint =
+    "The largest error of the displacement over the run, as a share of its largest value.";
+  if (error === null) return { label: "Accuracy", value: "not known", place, hint };
+  if (horizon !== null)
+    return {
+      label: "Accuracy",
+      value: `to ${quantity(horizon, "s", 3)}`,
+      note: "later only statistics and spectra hold",
+      tone: "limited",
+      place: "concepts#trust-horizon",
+      hint: "Up to the trust horizon the motion is right to a millionth of its largest value.",
+    };
+  return {
+    label: "Accuracy",
+    value: error === 0 ? "exact" : share(error, 2),
+    note: "of the largest displacement",
+    place,
+    hint,
+  };
+}
+
+export function ResultHeadlines() {
+  const { result } = useResult();
+  const { summary, units, scene } = result;
+  const hasDamper = scene.dampers.length > 0;
+  const items = [
+    effect(
+      hasDamper ? "Motion, rms" : "Displacement, rms",
+      summary,
+      units,
+      "rms_displacement",
+      "concepts#summary",
+    ),
+    effect(
+      hasDamper ? "Motion, peak" : "Displacement, peak",
+      summary,
+      units,
+      "peak_displacement",
+      "concepts#summary",
+    ),
+    effect("Acceleration, rms", summary, units, "rms_acceleration", "concepts#summary"),
+    hasDamper && { label: "Impacts", value: number(summary.impacts, 7), place: "concepts#impacts" },
+    hasDamper && {
+      label: "Largest force",
+      value: quantity(summary.peak_contact_force, "N"),
+      place: "concepts#impacts",
+    },
+    accuracy(summary),
+  ];
+  return html`<${Headlines} items=${items.filter(Boolean)} />`;
+}

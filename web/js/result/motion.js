@@ -1,0 +1,254 @@
+// The motion over time: charts on one time axis, impacts as ticks, the structure without its damper, the free mass between
+// its stops.
+import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { Chart, MARGIN } from "../chart/chart.js";
+import { Button, Failure, Notice } from "../ui/controls.js";
+import { useLoaded } from "../ui/store.js";
+import { go } from "../address.js";
+import { post } from "../api.js";
+import { number, quantity, title, words } from "../units.js";
+import { useBare } from "./bare.js";
+import { channelNames, useResult, windowOf } from "./context.js";
+import { seriesOf, timeOfEnergy, useSeries } from "./series.js";
+
+const MOST_MARKERS = 300;
+const QUIET_PART = 0.7; // where the motion dies before this part of the run, only that much is shown at first
+
+// One colour for each quantity, from the drawing to the legend: variables of style.css.
+export const quantityColor = (channel) =>
+  ({
+    displacement: "displacement",
+    velocity: "velocity",
+    acceleration: "acceleration",
+    mean_acceleration: "acceleration",
+    base_acceleration: "base",
+    damper_displacement: "damper",
+    damper_velocity: "damper",
+    relative: "damper",
+    contact_force: "force",
+    penetration: "penetration",
+    base_shear: "shear",
+    storey_drift: "drift",
+  })[channel.replace(/_\d+$/, "")] ?? "accent";
+
+const wordOf = (channel) => channel.replace(/_\d+$/, "");
+const numberOf = (channel) => /_(\d+)$/.exec(channel)?.[1];
+
+// The charts of a result: {key, title, unit, channels, kind}. "relative" is the free mass as the structure sees it.
+function chartsOf(result) {
+  const names = channelNames(result);
+  const { scene, units, channels } = result;
+  const charts = [];
+  const add = (word, heading) => {
+    const all = channels.filter((channel) => wordOf(channel) === word);
+    if (all.length > 0)
+      charts.push({ key: word, title: heading ?? title(word), unit: units[all[0]], channels: all });
+  };
+  add("displacement");
+  scene.dampers.forEach((damper, index) => {
+    const own = names.ofDamper("damper_displacement", index + 1);
+    const carrier = names.ofStorey("displacement", damper.storey);
+    if (!names.has(own) || !names.has(carrier)) return;
+    const which = scene.dampers.length > 1 ? ` ${index + 1}` : "";
+    charts.push({
+      key: `relative_${index + 1}`,
+      title: `Free mass${which} between its stops`,
+      unit: "m",
+      channels: [own, carrier],
+      damper,
+    });
+  });
+  add("contact_force");
+  const taken = new Set(["displacement", "contact_force"]);
+  for (const word of new Set(channels.map(wordOf))) if (!taken.has(word)) add(word);
+  return charts;
+}
+
+const usual = (charts) =>
+  charts
+    .filter(({ key }) => key === "displacement" || key === "relative_1" || key === "contact_force")
+    .map(({ key }) => key);
+
+// The walls of a damper's cavity as the free mass' middle meets them.
+function walls({ clearance, offset }) {
+  return [
+    { y: offset - clearance / 2, label: "left stop", color: "wall" },
+    { y: offset + clearance / 2, label: "right stop", color: "wall" },
+  ];
+}
+
+// What lies behind the stops, shaded: the free mass is there while it presses a buffer.
+const buffers = ({ clearance, offset }) =>
+  function Buffers({ y, left, right, top, bottom }) {
+    const upper = Math.max(top, y.to(offset + clearance / 2));
+    const lower = Math.min(bottom, y.to(offset - clearance / 2));
+    return html`<g class="buffers">
+      <rect x=${left} y=${top} width=${right - left} height=${Math.max(0, upper - top)} />
+      <rect x=${left} y=${lower} width=${right - left} height=${Math.max(0, bottom - lower)} />
+    </g>`;
+  };
+
+function seriesFor(chart, { time, columns }, bare) {
+  if (chart.damper) {
+    const [own, carrier] = chart.channels.map((channel) => columns.get(channel));
+    if (own.values) {
+      const relative = own.values.map((value, at) => value - carrier.values[at]);
+      return [{ label: "free mass", color: "damper", x: time, y: relative }];
+    }
+    // Of buckets only bounds are known.
+    const low = own.low.map((value, at) => value - carrier.high[at]);
+    const high = own.high.map((value, at) => value - carrier.low[at]);
+    return [{ kind: "band", label: "free mass, at most", color: "damper", x: time, low, high }];
+  }
+  const drawn = chart.channels.slice(0, 8);
+  const series = drawn.map((channel, at) => {
+    const color = drawn.length > 1 ? `c${at + 1}` : quantityColor(channel);
+    const label =
+      drawn.length > 1 ? `${words(chart.key)} ${numberOf(channel) ?? at + 1}` : "with the damper";
+    return seriesOf(label, color, time, columns.get(channel));
+  });
+  const isTop = chart.key === "displacement";
+  if (isTop && bare)
+    series.unshift(seriesOf("without damper", "ghost", bare.time, bare.column, { dash: false }));
+  return series;
+}
+
+export function Motion() {
+  const context = useResult();
+  const { result, query, change, ledger, path } = context;
+  const box = useRef(null);
+  const [pixels, setPixels] = useState(0);
+  useLayoutEffect(() => {
+    const width = box.current.clientWidth - MARGIN.left - MARGIN.right;
+    setPixels(Math.max(200, Math.round(width * (globalThis.devicePixelRatio ?? 1))));
+  }, []);
+  const charts = useMemo(() => chartsOf(result), [result.id]);
+  const named = query.channels?.split(",");
+  const chosen = charts.filter(({ key }) => (named ?? usual(charts)).includes(key));
+  const shown = chosen.length > 0 || named ? chosen : charts.slice(0, 1);
+  const channels = [...new Set(shown.flatMap((chart) => chart.channels))];
+  const isAuto = query.from === undefined && query.to === undefined;
+  const window = windowOf(result, query);
+  const loaded = useSeries({ path, result, channels, window, pixels });
+  const bare = useBare(
+    result,
+    channels.find((channel) => wordOf(channel) === "displacement") ?? "displacement",
+  );
+  const impacts = useLoaded(
+    () => ledger.window(window.from, window.to, MOST_MARKERS),
+    [result.id, window.from, window.to],
+  );
+
+  // At first as much as holds the energy of a decaying motion.
+  const quiet = useMemo(() => {
+    const column = loaded.data?.columns.get(channels[0]);
+    if (!column?.values || result.count > column.values.length) return null;
+    const until = timeOfEnergy(loaded.data.time, column.values) * 1.1;
+    return until < QUIET_PART * window.end ? Number(until.toPrecision(2)) : null;
+  }, [loaded.data]);
+  const range = isAuto ? quiet && [0, quiet] : [window.from, window.to];
+  const setRange = (next) =>
+    change(
+      next
+        ? { from: trimmed(next[0]), to: trimmed(next[1]) }
+        : { from: quiet ? 0 : null, to: quiet ? window.end : null },
+      true,
+    );
+
+  const horizon = result.summary.trust_horizon;
+  const spans =
+    horizon === null ? [] : [{ from: horizon, to: window.end, label: "only statistics hold here" }];
+  const isCut = impacts.data && impacts.data.count > impacts.data.impacts.length;
+  const markers =
+    isCut || !impacts.data
+      ? []
+      : impacts.data.impacts.map((impact) => ({
+          x: impact.start,
+          color: "force",
+          isChosen: String(impact.number) === query.impact,
+          label: `${impact.kind} ${impact.number}, ${impact.side} stop, ${quantity(impact.peak_force, "N")}`,
+          onPick: () => change({ impact: impact.number }, true),
+        }));
+  const instant = Number(query.t);
+  const rules =
+    query.t !== undefined && Number.isFinite(instant)
+      ? [{ x: instant, label: "", color: "accent" }]
+      : [];
+  // Data of charts that were just chosen may be on their way.
+  const drawable = shown.filter((chart) =>
+    chart.channels.every((name) => loaded.data?.columns.has(name)),
+  );
+  const remarks = [
+    isAuto &&
+      quiet &&
+      `The first ${quantity(quiet, "s")} of ${quantity(window.end, "s")} hold almost all of the motion.`,
+    loaded.data?.isEnvelope &&
+      `Each pixel shows the least and the largest of ${number(loaded.data.bucket)} samples.`,
+    isCut && `${number(impacts.data.count)} contacts: zoom to ${MOST_MARKERS} to see them marked.`,
+  ]
+    .filter(Boolean)
+    .join(" ");
+  const heights = shown.length <= 3 ? [180, 160, 160] : [160];
+
+  return html`<section class="motion" aria-label="Motion over time" ref=${box}>
+    ${loaded.error && html`<${SeriesFailure} error=${loaded.error} path=${path} />`}
+    ${
+      loaded.data &&
+      drawable.map((chart, at) => {
+        const isLast = at === drawable.length - 1;
+        return html`<${Chart}
+          key=${chart.key}
+          title=${chart.title}
+          x=${{ label: "Time", unit: "s", domain: [0, window.end] }}
+          y=${{ label: chart.title, unit: chart.unit }}
+          height=${heights[Math.min(at, heights.length - 1)]}
+          series=${seriesFor(chart, loaded.data, bare.data)}
+          range=${range}
+          onRange=${setRange}
+          group="time"
+          isCompact=${!isLast}
+          spans=${spans}
+          rules=${[...rules, ...(chart.damper ? walls(chart.damper) : [])]}
+          markers=${at === 0 ? markers : []}
+          underlay=${chart.damper && buffers(chart.damper)}
+        />`;
+      })
+    }
+    <div class="motion-foot">
+      <div class="chips" role="group" aria-label="Charts">
+        ${charts.map(
+          ({ key, title: name }) =>
+            html`<button
+              type="button"
+              class="chip"
+              aria-pressed=${shown.some((one) => one.key === key)}
+              onClick=${() => change({ channels: toggled(charts, shown, key) }, true)}
+            >
+              ${name}
+            </button>`,
+        )}
+      </div>
+      <p class="hint">${remarks}</p>
+    </div>
+  </section>`;
+}
+
+const trimmed = (value) => Number(value.toPrecision(8));
+function toggled(charts, shown, key) {
+  const keys = new Set(shown.map((one) => one.key));
+  if (!keys.delete(key)) keys.add(key);
+  return (
+    charts
+      .map((one) => one.key)
+      .filter((one) => keys.has(one))
+      .join() || "none"
+  );
+}
+
+function SeriesFailure({ error, path }) {
+  if (error.status !== 410) return html`<${Failure} error=${error} />`;
+  const again = () => post(`${path}/again`).then(({ id }) => go(`jobs/${id}`));
+  return html`<${Notice} kind="warn" title="The series of this result is not stored any more">
+    <p><${Button} onClick=${again}>Run the scene again<//></p>
+  <//>`;
+}

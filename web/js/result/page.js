@@ -1,0 +1,185 @@
+// A result: the six numbers, the motion beside its animation and the selected impact, and everything else in tabs.
+import { html, useMemo, useState } from "../ui/preact.js";
+import { link, note, read } from "../address.js";
+import { get, session } from "../api.js";
+import { Failure, Loaded, Notice, Panel, Tabs } from "../ui/controls.js";
+import { useLoaded, useStore } from "../ui/store.js";
+import { pageOf } from "../ui/page.js";
+import { Ledger } from "../ledger.js";
+import { section as animation } from "../animation.js";
+import { ResultContext, windowOf } from "./context.js";
+import { Energy } from "./energy.js";
+import { Files } from "./files.js";
+import { ResultHeadlines } from "./headlines.js";
+import { ImpactPanel } from "./impact.js";
+import { ImpactTable } from "./impacts.js";
+import { Section } from "./legacy.js";
+import { Method } from "./method.js";
+import { Motion } from "./motion.js";
+import { Spectrum } from "./spectrum.js";
+
+// What parts built from elements expect: the result, its latest jobs, its impacts, the view and how to change it.
+class ClassicContext {
+  followers = new Set();
+  constructor(result, signal, change) {
+    Object.assign(this, { result, signal, change, path: `v1/results/${result.id}`, view: {} });
+    this.ledger = new Ledger(this);
+    this.jobs = get("v1/jobs", { result: result.id, limit: 20 }).then(({ jobs }) => jobs);
+    this.jobs.catch(() => {}); // who shows them says so
+  }
+  get window() {
+    return windowOf(this.result, this.view);
+  }
+}
+
+// What the parts of the page share, by the address as it is now.
+function useResultContext(result, signal) {
+  const [, redraw] = useState(0);
+  const classic = useMemo(() => {
+    const change = (changes, push = false) => {
+      note(changes, push);
+      made.view = read().query;
+      for (const follow of made.followers) follow(made.view);
+      redraw((count) => count + 1);
+    };
+    const made = new ClassicContext(result, signal, change);
+    return made;
+  }, [result.id]);
+  const { query } = read();
+  classic.view = query;
+  return {
+    result,
+    query,
+    classic,
+    path: classic.path,
+    ledger: classic.ledger,
+    change: classic.change,
+  };
+}
+
+export function ResultView({ result, signal }) {
+  const context = useResultContext(result, signal);
+  const { classic, query: view } = context;
+  const tabs = [
+    { name: "impacts", title: "Impacts", view: () => html`<${ImpactTable} />` },
+    { name: "spectrum", title: "Spectrum", view: () => html`<${Spectrum} />` },
+    { name: "energy", title: "Energy", view: () => html`<${Energy} />` },
+    {
+      name: "accuracy",
+      title: "How it was computed",
+      view: () => html`<${Method} />`,
+    },
+    { name: "files", title: "Files and code", view: () => html`<${Files} />` },
+  ];
+  const hasDamper = result.scene.dampers.length > 0;
+  return html`<${ResultContext.Provider} value=${context}>
+    <${ResultHeadlines} />
+    <div class="panel-grid">
+      <${Motion} />
+      <aside>
+        <${Animation} />
+        ${hasDamper && html`<${ImpactPanel} />`}
+      </aside>
+    </div>
+    <${Warnings} warnings=${result.warnings} />
+    <${Tabs}
+      label="More of this result"
+      tabs=${tabs}
+      chosen=${view.tab ?? "impacts"}
+      onChoose=${(name) => classic.change({ tab: name })}
+    />
+  <//>`;
+}
+
+const Animation = () =>
+  html`<section aria-label="In slow motion"><${Section} section=${animation} /></section>`;
+
+// Remarks: none of them changes the numbers above.
+const Warnings = ({ warnings }) =>
+  warnings.length > 0 &&
+  html`<${Notice}
+    kind="info"
+    title=${warnings.length === 1 ? "A remark" : `${warnings.length} remarks`}
+  >
+    <ul>
+      ${warnings.map((warning) => html`<li>${warning.detail}</li>`)}
+    </ul>
+  <//>`;
+
+const design = () => import("../design_view.js");
+const STUDIES = {
+  compare: { title: "Contact models side by side", view: () => import("../compare_view.js") },
+  sensitivity: {
+    title: "What errors of the buffers do",
+    view: () => import("../sensitivity_view.js"),
+  },
+  tradeoff: { title: "Error against cost", view: () => import("../tradeoff_view.js") },
+  sweep: { title: "Many points", view: () => import("../sweep_view.js") },
+  ensemble: { title: "Many runs", view: () => import("../ensemble_view.js") },
+  optimize: { title: "The best values", view: design },
+  calibrate: { title: "Parameters fitted to a measurement", view: design },
+  response: { title: "Response curve", view: design },
+  fragility: { title: "Fragility", view: design },
+};
+
+// A study: its own view; the run of the scene without it can be opened below.
+function StudyView({ result, query, signal }) {
+  const [isOpen, setIsOpen] = useState(false);
+  const { kind } = result.study;
+  const { title, view } = STUDIES[kind];
+  const section = useMemo(
+    () => ({ show: async (host, context) => (await view()).show(host, context) }),
+    [kind],
+  );
+  const context = useResultContext(result, signal);
+  return html`<${ResultContext.Provider} value=${context}>
+      <${Panel} title=${title} help=${title}>
+        <${Section} section=${section} />
+        <p>
+          <a class="button" href=${link("scene", { result: result.id })}>Change the study</a>
+          <a class="help" href=${`guide/study-${kind}.html`} aria-label="Guide: this study">?</a>
+        </p>
+      <//>
+      <${Panel} title="Files and code"><${Files} /><//>
+    <//>
+    <details onToggle=${(event) => setIsOpen(event.currentTarget.open)}>
+      <summary>The run of the unchanged scene, without the study</summary>
+      ${isOpen && html`<${ResultView} result=${result} query=${query} signal=${signal} />`}
+    </details>`;
+}
+
+function ResultPage({ address, signal }) {
+  const id = address.path[1];
+  const attempt = useStore(session);
+  const loaded = useLoaded(
+    () => get(`v1/results/${encodeURIComponent(id)}`, null, signal),
+    [id],
+    attempt,
+  );
+  const jobs = useLoaded(
+    async () => (await get("v1/jobs", { result: id, limit: 20 })).jobs,
+    [id],
+    attempt,
+  );
+  const name = jobs.data?.find((job) => job.title)?.title ?? "Result";
+  return html`<div class="result">
+    <div class="title-row">
+      <h1>${name}</h1>
+      ${
+        loaded.data &&
+        html`<div class="actions">
+          <a class="button primary" href=${link("scene", { result: loaded.data.id })}
+            >Change this scene</a
+          >
+          <a class="button" href=${link("compare", { a: loaded.data.id })}>Compare with …</a>
+        </div>`
+      }
+    </div>
+    ${jobs.error && html`<${Failure} error=${jobs.error} />`}
+    <${Loaded} loaded=${loaded}>
+      ${(result) => html`<${result.study ? StudyView : ResultView} result=${result} query=${address.query} signal=${signal} />`}
+    <//>
+  </div>`;
+}
+
+export const page = pageOf(({ path }) => `Result ${path[1].slice(0, 10)}`, ResultPage);

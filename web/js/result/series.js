@@ -1,0 +1,70 @@
+// The motion of a result in a window of time: every sample while there are few enough to draw, else the least and the largest
+// of buckets, one for each device pixel.
+import { ask, get } from "../api.js";
+import { readNpy } from "../npy.js";
+import { useLoaded } from "../ui/store.js";
+
+export const MOST_SAMPLES = 50000;
+
+// {time, columns: Map of channel to {values} or {low, high}, isEnvelope, bucket} of these channels.
+export async function loadSeries({ path, result, channels, window, pixels, signal }) {
+  const { sample_rate: rate, count } = result;
+  const names = channels.join();
+  const inWindow = (window.to - window.from) * rate;
+  if (inWindow <= MOST_SAMPLES) {
+    const isWhole = count <= MOST_SAMPLES;
+    const query = isWhole
+      ? { channels: names }
+      : { channels: names, from: window.from, to: window.to };
+    const response = await ask("GET", `${path}/series.npy`, { query, signal });
+    const [time, ...columns] = readNpy(await response.arrayBuffer());
+    const found = new Map(channels.map((channel, at) => [channel, { values: columns[at] }]));
+    return { time, columns: found, isEnvelope: false, bucket: 1 };
+  }
+  const query = { channels: names, from: window.from, to: window.to, points: pixels };
+  const series = await get(`${path}/series.json`, query, signal);
+  const { start, bucket = 1 } = series;
+  const time = Float64Array.from(
+    { length: series.count },
+    (_, k) => start + ((k + 0.5) * bucket - 0.5) / rate,
+  );
+  const column = (channel) => {
+    const { values, min, max } = series.channels[channel];
+    return values ? { values } : { low: min, high: max };
+  };
+  const found = new Map(channels.map((channel) => [channel, column(channel)]));
+  return { time, columns: found, isEnvelope: bucket > 1, bucket };
+}
+
+// The same as the state of a view. A result of few samples is loaded once, whatever the window.
+export function useSeries({ path, result, channels, window, pixels }) {
+  const isWhole = result.count <= MOST_SAMPLES;
+  const keys = [
+    path,
+    channels.join(),
+    pixels > 0,
+    ...(isWhole ? [] : [window.from, window.to, pixels]),
+  ];
+  return useLoaded(async (signal) => {
+    if (pixels === 0 || channels.length === 0) return null;
+    return loadSeries({ path, result, channels, window, pixels, signal });
+  }, keys);
+}
+
+// A chart's series from a column.
+export const seriesOf = (label, color, time, column, more) =>
+  column.values
+    ? { kind: "line", label, color, x: time, y: column.values, ...more }
+    : { kind: "band", label, color, x: time, low: column.low, high: column.high, ...more };
+
+// The time by which this part of a motion's sum of squares has passed: where there is something to see.
+export function timeOfEnergy(time, values, part = 0.9995) {
+  let total = 0;
+  for (const value of values) total += value * value;
+  let sum = 0;
+  for (let at = 0; at < values.length; at++) {
+    sum += values[at] * values[at];
+    if (sum >= part * total) return time[at];
+  }
+  return time[time.length - 1];
+}

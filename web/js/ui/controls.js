@@ -1,0 +1,208 @@
+// Small parts of pages: buttons, notices, panels, tabs, menus, headline numbers.
+import { places } from "../help.js";
+import { html, useEffect, useRef, useState } from "./preact.js";
+import { announce } from "./announce.js";
+import { freshId } from "./ids.js";
+
+// A button that is not pressed again while what it did goes on; what fails is shown behind it.
+export function Button({ onClick, isPrimary, isQuiet, disabled, label, title, children }) {
+  const [isBusy, setIsBusy] = useState(false);
+  const [error, setError] = useState(null);
+  const act = async (event) => {
+    setError(null);
+    const done = onClick?.(event);
+    if (!(done instanceof Promise)) return;
+    setIsBusy(true);
+    try {
+      await done;
+    } catch (problem) {
+      if (problem.name !== "AbortError") setError(problem);
+    } finally {
+      setIsBusy(false);
+    }
+  };
+  return html`<button
+      type="button"
+      class=${(isPrimary && "primary") || (isQuiet && "quiet") || null}
+      disabled=${disabled || isBusy}
+      aria-busy=${isBusy || null}
+      aria-label=${label}
+      title=${title}
+      onClick=${act}
+    >
+      ${children}</button
+    >${error && html`<${Failure} error=${error} />`}`;
+}
+
+// A small quiet button; `label` says what it does where its text is an abbreviation.
+export const IconButton = ({ label, onClick, pressed, disabled, children }) =>
+  html`<button
+    type="button"
+    class="icon"
+    aria-label=${label}
+    title=${label}
+    aria-pressed=${pressed}
+    disabled=${disabled}
+    onClick=${onClick}
+  >
+    ${children}
+  </button>`;
+
+// Puts a text, or what a function returns, on the clipboard.
+export function CopyButton({ text, label = "Copy" }) {
+  const [state, setState] = useState(null);
+  const copy = async () => {
+    try {
+      await navigator.clipboard.writeText(typeof text === "function" ? text() : text);
+      setState("Copied");
+      announce("Copied");
+    } catch {
+      setState("Select and copy it by hand"); // a page without TLS may not
+    }
+    setTimeout(() => setState(null), 2000);
+  };
+  return html`<button type="button" class="quiet" onClick=${copy}>${state ?? label}</button>`;
+}
+
+// A box with a heading: kind is "info", "ok", "warn" or "bad"; "bad" is announced at once.
+export const Notice = ({ kind = "info", title, children }) =>
+  html`<div class=${`notice ${kind}`} role=${kind === "bad" ? "alert" : null}>
+    <strong>${title}</strong>${children}
+  </div>`;
+
+const faultPlace = ({ pointer, row, column }) => (row ? `row ${row}, ${column}` : pointer);
+export const faultText = ({ detail, did_you_mean: meant }) =>
+  `${detail}${meant ? ` (did you mean "${meant}"?)` : ""}`;
+
+// What went wrong, with every fault and its place, as the service said it.
+export const Failure = ({ error: { title, errors, message, detail } }) =>
+  html`<${Notice} kind="bad" title=${title ?? "That did not work"}>
+    ${
+      errors?.length > 0
+        ? html`<ul>
+            ${errors.map((fault) => html`<li><code>${faultPlace(fault)}</code> ${faultText(fault)}</li>`)}
+          </ul>`
+        : html`<p>${message ?? detail}</p>`
+    }
+  <//>`;
+
+// What waits for `loaded` ({data, error, isLoading} of useLoaded) before it shows anything.
+export function Loaded({ loaded, children }) {
+  if (loaded.error) return html`<${Failure} error=${loaded.error} />`;
+  if (loaded.data === null) return html`<p class="quiet">Loading …</p>`;
+  return children(loaded.data);
+}
+
+// A "?" that leads to the guide's place on what a heading names; `hint` is one sentence shown at the pointer.
+export function Help({ name, place = places[name], hint }) {
+  if (!place) return null;
+  const target = `guide/${place.replace(/#|$/, ".html$&")}`;
+  return html`<a class="help" href=${target} aria-label=${`Guide: ${name}`} title=${hint}>?</a>`;
+}
+
+export const Panel = ({ title, help = title, actions, children }) =>
+  html`<section class="panel" aria-label=${title}>
+    <div class="panel-head">
+      <h2>${title}</h2>
+      <${Help} name=${help} />
+      ${actions && html`<div class="actions">${actions}</div>`}
+    </div>
+    ${children}
+  </section>`;
+
+// Tabs over panels: [{name, title, view()}]; only the chosen one is made. Arrow keys move between tabs.
+export function Tabs({ label, tabs, chosen, onChoose }) {
+  const id = useRef(null);
+  id.current ??= freshId("tabs");
+  const at = Math.max(
+    0,
+    tabs.findIndex((tab) => tab.name === chosen),
+  );
+  const move = (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    const next = (at + step + tabs.length) % tabs.length;
+    onChoose(tabs[next].name);
+    event.currentTarget.children[next].focus();
+  };
+  return html`<section class="tabs" aria-label=${label}>
+    <div role="tablist" aria-label=${label} onKeyDown=${move}>
+      ${tabs.map(
+        (tab, index) =>
+          html`<button
+            type="button"
+            role="tab"
+            id=${`${id.current}-${tab.name}`}
+            aria-selected=${index === at}
+            aria-controls=${`${id.current}-panel`}
+            tabindex=${index === at ? 0 : -1}
+            onClick=${() => onChoose(tab.name)}
+          >
+            ${tab.title}
+          </button>`,
+      )}
+    </div>
+    <div
+      role="tabpanel"
+      id=${`${id.current}-panel`}
+      aria-labelledby=${`${id.current}-${tabs[at].name}`}
+      tabindex="0"
+    >
+      ${tabs[at].view()}
+    </div>
+  </section>`;
+}
+
+// One of a few: [{value, label}] as buttons side by side.
+export const Choice = ({ label, options, value, onChange }) =>
+  html`<div class="choice" role="group" aria-label=${label}>
+    ${options.map(
+      (option) =>
+        html`<button
+          type="button"
+          aria-pressed=${option.value === value}
+          onClick=${() => onChange(option.value)}
+        >
+          ${option.label}
+        </button>`,
+    )}
+  </div>`;
+
+// Actions behind a button; Escape and a click elsewhere close it.
+export function Menu({ label, children }) {
+  const [isOpen, setIsOpen] = useState(false);
+  const box = useRef(null);
+  useEffect(() => {
+    if (!isOpen) return undefined;
+    const close = (event) => {
+      const isAway =
+        event.type === "keydown" ? event.key === "Escape" : !box.current.contains(event.target);
+      if (isAway) setIsOpen(false);
+    };
+    addEventListener("pointerdown", close);
+    addEventListener("keydown", close);
+    return () => {
+      removeEventListener("pointerdown", close);
+      removeEventListener("keydown", close);
+    };
+  }, [isOpen]);
+  return html`<div class="menu" ref=${box}>
+    <button type="button" aria-expanded=${isOpen} onClick=${() => setIsOpen(!isOpen)}>
+      ${label}
+    </button>
+    ${isOpen && html`<div class="menu-items" onClick=${() => setIsOpen(false)}>${children}</div>`}
+  </div>`;
+}
+
+// Headline numbers: [{label, value, note, tone, help}].
+export const Headlines = ({ items }) =>
+  html`<dl class="headlines">
+    ${items.map(
+      ({ label, value, note, tone, hint, place }) =>
+        html`<div class=${tone}>
+          <dt>${label} ${place && html`<${Help} name=${label} place=${place} hint=${hint} />`}</dt>
+          <dd>${value}${note && html`<small>${note}</small>`}</dd>
+        </div>`,
+    )}
+  </dl>`;

@@ -1,0 +1,152 @@
+// Tables of results: one unit for a column, decimals aligned, sorted by a click on a heading, filtered by words, copied.
+import { html, useMemo, useState } from "./preact.js";
+import { CopyButton } from "./controls.js";
+import { number, pretty, scale } from "../units.js";
+
+const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
+
+// How a column of numbers is written: its factor and unit, and as many decimals as show `digits` digits of the largest.
+export function columnFormat(values, unit, digits = 4) {
+  const sizes = values.filter(isNumber).map(Math.abs);
+  const largest = sizes.length > 0 ? Math.max(...sizes) : 0;
+  const [factor, shown] = scale(largest, unit);
+  const size = largest / factor;
+  const isWhole = values.every((value) => !isNumber(value) || Number.isInteger(value / factor));
+  const isPlain = size === 0 || (size >= 1e-3 && size < 1e6);
+  const decimals =
+    isWhole || size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
+  const write = (value) => {
+    if (!isNumber(value)) return number(value, digits);
+    return isPlain
+      ? (value / factor).toFixed(Math.min(decimals, 9)).replace("-", "−")
+      : number(value / factor, digits);
+  };
+  return { factor, unit: shown === "1" ? "" : pretty(shown), write };
+}
+
+const isMissing = (value) => value === null || value === undefined;
+function compare(a, b) {
+  if (isMissing(a) || isMissing(b)) return Number(isMissing(a)) - Number(isMissing(b));
+  if (typeof a === "string") return a.localeCompare(b, "en", { numeric: true });
+  return a - b;
+}
+
+// A table of `rows`. A column is {label, value(row), unit, digits, cell(row), isNumeric}: `value` is what is sorted and
+// copied; numbers are written in the column's unit, or as `cell` shows them. `filter` shows a field whose words rows must
+// contain; `selection` is {chosen: Set of keys, toggle(row)}, with `keyOf(row)`; `chosenKey` marks a row.
+export function Table({
+  caption,
+  columns,
+  rows,
+  filter,
+  selection,
+  keyOf,
+  chosenKey,
+  onRow,
+  empty = "Nothing here yet.",
+}) {
+  const [order, setOrder] = useState({ column: -1, direction: 1 });
+  const [words, setWords] = useState("");
+  const formats = useMemo(
+    () =>
+      columns.map((column) =>
+        column.unit !== undefined || column.isNumeric
+          ? columnFormat(rows.map(column.value), column.unit, column.digits)
+          : null,
+      ),
+    [columns, rows],
+  );
+  const textOf = (column, row, at) => {
+    const value = column.value(row);
+    return formats[at] && isNumber(value)
+      ? formats[at].write(value)
+      : isMissing(value)
+        ? "–"
+        : String(value);
+  };
+  const wanted = words.toLowerCase().split(/\s+/).filter(Boolean);
+  const matches = (row) => {
+    const text = columns.map((column) => String(column.value(row) ?? "").toLowerCase()).join("\n");
+    return wanted.every((word) => text.includes(word));
+  };
+  let shown = wanted.length > 0 ? rows.filter(matches) : rows;
+  if (order.column >= 0) {
+    const { value } = columns[order.column];
+    shown = shown.toSorted((a, b) => order.direction * compare(value(a), value(b)));
+  }
+  const headOf = (column, at) =>
+    `${column.label}${formats[at]?.unit ? ` [${formats[at].unit}]` : ""}`;
+  const lines = () =>
+    [
+      columns.map((column) => `${column.label}${column.unit ? ` [${column.unit}]` : ""}`),
+      ...shown.map((row) => columns.map((column) => column.value(row) ?? "")),
+    ]
+      .map((cells) => cells.join("\t"))
+      .join("\n");
+  const sort = (at) =>
+    setOrder({ column: at, direction: order.column === at ? -order.direction : 1 });
+  const ariaSort = (at) => {
+    if (order.column !== at) return "none";
+    return order.direction > 0 ? "ascending" : "descending";
+  };
+  return html`<div class="table">
+    <div class="table-tools">
+      ${filter && html`<input type="search" placeholder=${filter} aria-label=${filter} value=${words} onInput=${(event) => setWords(event.currentTarget.value)} />`}
+      ${rows.length > 0 && html`<${CopyButton} text=${lines} label="Copy" />`}
+    </div>
+    <div class="scroll" tabindex="0" role="region" aria-label=${caption}>
+      <table>
+        <caption class="visually-hidden">
+          ${caption}
+        </caption>
+        <thead>
+          <tr>
+            ${selection && html`<th scope="col"><span class="visually-hidden">Choose</span></th>`}
+            ${columns.map(
+              (column, at) =>
+                html`<th
+                  scope="col"
+                  class=${formats[at] ? "number" : null}
+                  aria-sort=${ariaSort(at)}
+                >
+                  <button type="button" class="sort" onClick=${() => sort(at)}>
+                    ${headOf(column, at)}
+                  </button>
+                </th>`,
+            )}
+          </tr>
+        </thead>
+        <tbody>
+          ${shown.map(
+            (row) =>
+              html`<tr
+                key=${keyOf?.(row)}
+                class=${keyOf && chosenKey !== undefined && keyOf(row) === chosenKey ? "chosen" : null}
+                onClick=${onRow && (() => onRow(row))}
+              >
+                ${
+                  selection &&
+                  html`<td>
+                    <input
+                      type="checkbox"
+                      aria-label=${`Choose ${columns[0].value(row)}`}
+                      checked=${selection.chosen.has(keyOf(row))}
+                      onChange=${() => selection.toggle(row)}
+                    />
+                  </td>`
+                }
+                ${columns.map((column, at) => {
+                  const content = column.cell ? column.cell(row) : textOf(column, row, at);
+                  const kind = formats[at] ? "number" : null;
+                  return at === 0
+                    ? html`<th scope="row" class=${kind}>${content}</th>`
+                    : html`<td class=${kind}>${content}</td>`;
+                })}
+              </tr>`,
+          )}
+        </tbody>
+      </table>
+      ${shown.length === 0 && html`<p class="quiet empty">${rows.length > 0 ? "No row contains these words." : empty}</p>`}
+    </div>
+  </div>`;
+}
