@@ -171,6 +171,50 @@ static bool text_is_printable(const char *text) {
     return true;
 }
 
+// Prints the numbers of a finished job or a result on the terminal.
+static void summary_print(const JsonDocument *of, const char *result, const Terminal *terminal) {
+    static const char *const names[][2] = {
+        {"peak_displacement", "m"},    {"rms_displacement", "m"},   {"peak_acceleration", "m/s^2"},
+        {"rms_acceleration", "m/s^2"}, {"peak_contact_force", "N"}, {"impacts", NULL}};
+    Report report = {.is_page = false};
+    const JsonDocument *summary = json_get_object(of, "summary");
+    const char *title = json_get_text(of, "title"), *study = json_get_text(of, "study");
+    if (title == NULL)
+        title = json_get_text(json_get_object(of, "scene"), "title");
+    report_title(&report, title);
+    report_sentence(&report, "Result %s", result);
+    if (study != NULL)
+        report_sentence(&report, "The study is %s. The scene itself:", study);
+    PrintTable *table = report_table(&report, NULL, "response|value|change by dampers [%]");
+    for (size_t i = 0; i < COUNT(names); i++) {
+        char reduction[80];
+        const double value = json_get_number(summary, names[i][0]);
+        snprintf(reduction, sizeof reduction, "%s_reduction", names[i][0]);
+        const double part = json_get_number(summary, reduction);
+        if (isnan(value))
+            continue;
+        report_quantity(table, names[i][0], names[i][1]);
+        report_real(table, value);
+        report_real(table, part == 0 ? 0 : -100 * part);
+    }
+    const JsonDocument *warning;
+    Warnings notes = {.count = 0};
+    for (size_t i = 0; (warning = json_get_item(of, "warnings", i)) != NULL; i++) {
+        const char *pointer = json_get_text(warning, "pointer");
+        const char *detail = json_get_text(warning, "detail");
+        (void)warnings_add(&notes, pointer != NULL ? pointer : "", "%s",
+                           detail != NULL ? detail : "");
+    }
+    report_notes(&report, &notes);
+    warnings_clear(&notes);
+    if (study != NULL)
+        report_next(&report, "impactd open %.14s", result);
+    else
+        report_next(&report, "impactd get %.14s series -o motion.csv", result);
+    report_print(&report, terminal, &(Texts){.count = 0});
+    report_clear(&report);
+}
+
 // Sends the scene of the body.
 static Status submit_send(ApiCall *call, Problem *problem) {
     const JobsSettings *settings = call->settings;
@@ -199,7 +243,13 @@ static Status submit_send(ApiCall *call, Problem *problem) {
     if (is_json && (status == STATUS_OK || status == STATUS_TIMEOUT))
         TRY(api_print(call, problem));
     // A job that has ended is reported also if the end was not waited for.
-    return status == STATUS_OK && job_is_final(call) ? job_verdict(call, problem) : status;
+    if (status == STATUS_OK && job_is_final(call))
+        status = job_verdict(call, problem);
+    const char *result = job_text(call, "result");
+    Terminal terminal;
+    if (status == STATUS_OK && !is_json && wait > 0 && result != NULL && terminal_find(&terminal))
+        summary_print(call->reply, result, &terminal);
+    return status;
 }
 
 static Status submit_act(ApiCall *call, Problem *problem) {
@@ -439,6 +489,15 @@ static Status get_act(ApiCall *call, Problem *problem) {
                                            is_whole ? "" : "/", is_whole ? "" : what),
                           .output_max = settings->max_bytes};
     api_query_options(&request.path, call, "channels from to points");
+    Terminal terminal;
+    if (call->count == 1 && settings->output == NULL && terminal_find(&terminal)) {
+        request.output_max = 0;
+        TRY(api_ask(call, &request, problem));
+        if (json_get_text(api_reply(call), "id") == NULL)
+            return api_unexpected(call, "a result", problem);
+        summary_print(call->reply, json_get_text(call->reply, "id"), &terminal);
+        return STATUS_OK;
+    }
     return api_download(call, &request, settings->output, problem);
 }
 
@@ -491,7 +550,7 @@ const Command command_submit = {
     .operands = "SCENE.json",
     .summary = "send a scene to a server",
     .help = "  impactd submit scene.json                   # print the id of the job\n"
-            "  impactd submit scene.json --wait 60         # wait until it has finished\n"
+            "  impactd submit scene.json --wait 60         # wait, and print the numbers\n"
             "  impactd submit scene.json --wait 60 --json  # print the finished job\n"
             "  impactd submit scene.json --dry-run         # plan and cost; run nothing\n"
             "  impactd submit scene.json --title 'sponge, 15 mm' --label batch=7\n"
@@ -560,7 +619,8 @@ const Command command_get = {
     .name = "get",
     .operands = "RESULT-or-JOB [WHAT]",
     .summary = "download a result, its series, spectra or impacts",
-    .help = "  impactd get r-91c0                              # summary, plan and units\n"
+    .help = "  impactd get r-91c0                              # numbers; in a pipe, JSON\n"
+            "  impactd get r-91c0 result                       # summary, plan, units: JSON\n"
             "  impactd get r-91c0 series -o motion.npy         # time series\n"
             "  impactd get r-91c0 series -o motion.csv --channels displacement --to 2\n"
             "  impactd get r-91c0 series --points 500          # reduced to 500 points\n"

@@ -36,6 +36,15 @@ def test_submit_prints_the_job_and_waits_for_it():
                                    "--label", "batch=7", text=json.dumps(program.scene("paper_random_sponge")))
         job = json.loads(out)
         assert code == 0 and job["status"] == "successful" and job["title"] == 'a "b"\n', (code, job, errors)
+        # On a terminal, submit --wait and get show the numbers of the result.
+        code, out = program.on_terminal("submit", SPONGE, "--wait", "60", IMPACTD_SERVER=daemon.url)
+        result = re.search("^Result (r-[0-9a-f]{64})$", out, re.M)[1]
+        assert code == 0 and out.startswith("j-") and re.search(r"rms displacement \[m\] +0.00258388 +-30.7641\n", out), out
+        assert f"\nNext  impactd get {result[:14]} series -o motion.csv\n" in out and max(map(len, out.splitlines())) <= 80, out
+        code, shown = program.on_terminal("get", result, IMPACTD_SERVER=daemon.url)
+        assert code == 0 and shown[shown.index("Result"):] == out[out.index("Result"):], (shown, out)
+        code, shown = program.on_terminal("get", result, "result", IMPACTD_SERVER=daemon.url)
+        assert code == 0 and json.loads(shown)["id"] == result, shown
         code, out, errors = client(daemon.url, "submit", SPONGE, "--dry-run")
         assert code == 0 and json.loads(out)["dry_run"] is True, (code, out, errors)
         edits = ("--set", "dampers.0.clearance=10mm", "--vary", "duration=1:2:3")
