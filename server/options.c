@@ -129,6 +129,10 @@ static void option_set(const OptionReader *reader, const Field *row, const char 
         if (texts_append(member, value) != STATUS_OK)
             option_no_memory(reader);
     } else if (row->kind == FIELD_KIND_TEXT) {
+        // A file that would not be written; of other options the last one holds.
+        if (!is_first && origin == OPTION_FLAG && strcmp(row->name, "output") == 0)
+            (void)problem_add(reader->problem, STATUS_USAGE, typed,
+                              "can be given once: this command writes one file");
         if ((copy = strdup(value)) == NULL) {
             option_no_memory(reader);
             return;

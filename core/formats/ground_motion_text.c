@@ -159,7 +159,7 @@ static void motion_keep_text(MotionHeader *header, const TextLine *line) {
         header->text[used++] = *at == '\t' ? ' ' : isprint((unsigned char)*at) ? *at : '?';
 }
 
-// Refuses a file without a line of numbers; a decimal comma is the usual reason.
+// Refuses a file without a line of numbers; commas or semicolons are the usual reason.
 static Status motion_refuse_text(TextReader reader, size_t lines, Problem *problem) {
     TextLine line;
     TextWord word;
@@ -167,7 +167,8 @@ static Status motion_refuse_text(TextReader reader, size_t lines, Problem *probl
         const char *at = line.at;
         while (text_table_next_word(&line, &at, &word))
             if (strchr("+-.0123456789", *word.at) != NULL &&
-                memchr(word.at, ',', (size_t)(word.end - word.at)) != NULL)
+                (memchr(word.at, ',', (size_t)(word.end - word.at)) != NULL ||
+                 memchr(word.at, ';', (size_t)(word.end - word.at)) != NULL))
                 return text_table_refuse(&line, &word, problem);
     }
     return text_table_fault(problem, STATUS_UNREADABLE, lines > 0 ? lines : 1, 0,

@@ -160,8 +160,9 @@ static const char *text_refusal(const TextWord *word) {
                                    : "must be a number that a double can hold";
     if (end != NULL && text_number_end(end, word->end) != NULL)
         return "must be one number; these have run together";
-    if (memchr(word->at, ',', length) != NULL)
-        return "must be a number; blanks separate them, their decimal mark is a point";
+    if (memchr(word->at, ',', length) != NULL || memchr(word->at, ';', length) != NULL)
+        return "must be a number (separated by blanks, not by commas or semicolons, and with a "
+               "decimal point)";
     return "must be a number";
 }
 

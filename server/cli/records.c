@@ -271,8 +271,13 @@ const Command command_import = {
             "  impactd import - < motion.AT2               # from standard input\n"
             "\n"
             "Formats: PEER AT2, old and new; a count and an interval before one column; times\n"
-            "and accelerations in two columns; accelerations alone. --interval and --unit are\n"
-            "needed if the file does not state them. A summary is printed on standard error.\n"
+            "and accelerations in two columns; accelerations alone. Blanks separate columns.\n"
+            "--interval and --unit are needed if the file does not state them. A summary is\n"
+            "printed on standard error. The acceleration in a table with commas, as\n"
+            "\"impactd run -o out.csv\" writes it:\n"
+            "\n"
+            "  cut -d , -f 1,4 out.csv | tr , ' ' | impactd import - -o motion.json\n"
+            "\n"
             "Exit code 3 if the file has faults.\n",
     .options = import_fields,
     .size = sizeof(ImportSettings),

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/base/field.h"
+#include "core/solve/solver.h"
 #include "core/study/study.h"
 #include "server/api/app.h"
 #include "server/cli/client.h"
@@ -332,6 +333,8 @@ static void completion_command(FILE *file, const Command *command) {
                     : "value");
         for (size_t i = 0; row->kind == FIELD_KIND_CHOICE && row->choices[i] != NULL; i++)
             fprintf(file, "%s ", row->choices[i]);
+        for (size_t i = 0; strcmp(row->name, "solver") == 0 && solvers[i] != NULL; i++)
+            fprintf(file, "%s ", solvers[i]->kind.name);
         fputs("' ;;\n", file);
     }
     fputs("        esac\n", file);

@@ -151,7 +151,7 @@ def test_usage_faults():
             (("run", SPONGE, "-o"), "needs a value"),
             (("run", SPONGE, "-o", "out.xlsx"), ".csv"),
             (("run", SPONGE, "-o", "out"), ".csv"),
-            (("check",), "takes one scene"),
+            (("check",), "takes one scene"), (("run", SPONGE, "-o", "a.csv", "--output=b.csv"), "--output can be given once"),
             (("check", "--json=maybe", SPONGE), "true or false"),
             (("serve", "--workers", "many"), "--workers"),
             (("serve", "--workers", "100000"), "--workers"),

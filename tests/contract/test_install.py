@@ -112,6 +112,7 @@ def test_bash_completes_commands_options_and_values():
             assert set(complete(script, name, "-")) == {"--help", *options}, name
         assert complete(script, "sub") == ["submit"]
         assert complete(script, "tradeoff", "--metric", "imp") == ["impacts"]
+        assert complete(script, "tradeoff", "--solver", "rk") == ["rk4"]
         assert complete(script, "get", "r-1", "imp") == ["impacts"]
         assert complete(script, "token", "re") == ["revoke"] and complete(script, "token", "list", "") == []
         assert complete(script, "tradeoff", "-r", "x", "--metric", "=", "imp") == ["impacts"]

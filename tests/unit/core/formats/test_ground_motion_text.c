@@ -219,7 +219,8 @@ TEST(garbage_is_told_with_line_and_column) {
     }
     bad("1 1e308\n", &(GroundMotionOptions){1, ACCELERATION_G}, "line 1", "finite in m/s^2");
     // Commas throughout leave no line of numbers to begin with.
-    bad("t, a\n0.00,0.5\n0.01,0.6\n", &whole, "line 2, column 1", "blanks separate them");
+    bad("t, a\n0.00,0.5\n0.01,0.6\n", &whole, "line 2, column 1", "separated by blanks");
+    bad("t;a m/s^2\n0.00;0.5\n0.01;0.6\n", &whole, "line 2, column 1", "separated by blanks");
     bad("a motion\nof Nov 5, 1999\n", &whole, "line 2, column 8", "must be a number");
     bad("a motion\nof words\n", &whole, "line 2", "must hold a line of numbers up to here");
 }
