@@ -334,7 +334,8 @@ static void completion_command(FILE *file, const Command *command) {
         for (size_t i = 0; row->kind == FIELD_KIND_CHOICE && row->choices[i] != NULL; i++)
             fprintf(file, "%s ", row->choices[i]);
         for (size_t i = 0; strcmp(row->name, "solver") == 0 && solvers[i] != NULL; i++)
-            fprintf(file, "%s ", solvers[i]->kind.name);
+            if (solvers[i]->run != NULL) // not "auto"
+                fprintf(file, "%s ", solvers[i]->kind.name);
         fputs("' ;;\n", file);
     }
     fputs("        esac\n", file);

@@ -206,7 +206,7 @@ TEST(garbage_is_told_with_line_and_column) {
         {"0x10 2\n", "line 2, column 1", "must be"},
         {". 2\n", "line 2, column 1", "must be a number"},
         {"+-2 1\n", "line 2, column 1", "must be a number"},
-        {"0,5 1\n", "line 2, column 1", "decimal mark is a point"},
+        {"0,5 1\n", "line 2, column 1", "decimal point"},
         {"1 the end\n", "line 2, column 3", "must be a number, is the"},
         {"1 2 \xff\n", "line 2, column 5", "is ?"},
         {"1 0000000000000000000000000000000000000000000000000000000000000000001\n",
