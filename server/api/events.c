@@ -99,7 +99,7 @@ static void events_poll(Events *events) {
         bytes_text(&events->text, "event: stopping\n");
         events_put_data(
             &events->text,
-            "{\"detail\": \"the daemon stops; the job continues when it is started again\"}");
+            "{\"detail\": \"the server stops; the job continues when it is started again\"}");
         events->is_complete = true;
     } else {
         events_put_progress(events, state, progress);

@@ -119,7 +119,7 @@ Status health_ready(App *app, const Request *request, Reply *reply, Problem *pro
     (void)request;
     JobStats metrics = {0};
     if (atomic_load(&app->is_stopping))
-        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+        return problem_set(problem, STATUS_BUSY, "the server is stopping");
     if (!db_is_writable(app->db))
         return problem_set(problem, STATUS_BUSY,
                            "the last write to the database failed: is the disk full or read-only?");

@@ -153,7 +153,7 @@ static Status refuse_stopping(App *app, Problem *problem) {
     if (!atomic_load(&app->is_stopping))
         return STATUS_OK;
     return problem_set(problem, STATUS_BUSY,
-                       "the daemon is stopping and takes no new jobs; try again when it is back");
+                       "the server is stopping and takes no new jobs; try again when it is back");
 }
 
 static Status submit(App *app, const Request *request, const Submission *submission, Reply *reply,

@@ -82,7 +82,7 @@ Status measurements_evaluate(App *app, const Measurement *tests, size_t count, i
                            cpu_max);
     reply->retry_after = 10;
     return problem_set(problem, STATUS_BUSY, "%s",
-                       is_stopping ? "the daemon is stopping"
+                       is_stopping ? "the server is stopping"
                                    : "other long measurements are being evaluated: ask again");
 }
 

@@ -62,7 +62,7 @@ static Status check_target(const Copying *copying, Problem *problem) {
         if ((is_in_folder && strcmp(name, own_names[i]) == 0) ||
             (is_there && stat(own_path, &own) == 0 && is_same_file(&there, &own)))
             return problem_set(problem, STATUS_CONFLICT,
-                               "%s is the daemon's own file: name another one", path);
+                               "%s is the server's own file: name another one", path);
     }
     if (is_there && S_ISDIR(there.st_mode))
         return problem_set(problem, STATUS_CONFLICT, "%s is a folder: name a file in it", path);
@@ -187,7 +187,7 @@ static Status check_restore(const Copying *copying, Problem *problem) {
         return STATUS_OK;
     if (is_same_file(&source, &target))
         return problem_set(problem, STATUS_CONFLICT,
-                           "%s is the daemon's own database: name a copy of it", path);
+                           "%s is the server's own database: name a copy of it", path);
     return copying->request->replaces
                ? STATUS_OK
                : problem_set(problem, STATUS_CONFLICT,

@@ -85,7 +85,7 @@ Status check_open(const char *path, Sqlite **source, Problem *problem) {
     TRY(sqlite_first(*source, sql, NULL, NULL, columns, &tables, NULL, problem));
     if (tables.jobs != 3)
         return problem_set(problem, STATUS_NOT_FOUND,
-                           "%s holds nothing yet: no daemon has begun there", path);
+                           "%s holds nothing yet: no server has begun there", path);
     return STATUS_OK;
 }
 
@@ -93,7 +93,7 @@ Status check_exists(const char *path, const char *directory, Problem *problem) {
     return access(path, F_OK) == 0 || errno == EACCES
                ? STATUS_OK
                : problem_set(problem, STATUS_NOT_FOUND,
-                             "there is no database in %s; --data DIR names the daemon's folder",
+                             "there is no database in %s; --data DIR names the server's folder",
                              directory);
 }
 

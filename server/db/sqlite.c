@@ -99,7 +99,7 @@ Status sqlite_check_place(Sqlite *database, Problem *problem) {
         return STATUS_OK;
     return problem_set(problem, STATUS_IO,
                        "%s was deleted, moved or replaced while in use: nothing can be stored; put "
-                       "it back, or stop the daemon and start it again",
+                       "it back, or stop the server and start it again",
                        sqlite3_db_filename(database->connection, "main"));
 }
 

@@ -270,7 +270,7 @@ static int head_refuse_host(const char *host, const AcceptedHosts *hosts, Proble
     text_fit(shown, sizeof shown, host);
     problem_set(
         problem, STATUS_USAGE,
-        "the Host must be %s%s, with any port, is \"%s\"; the daemon's --host NAME adds one", list,
+        "the Host must be %s%s, with any port, is \"%s\"; the server's --host NAME adds one", list,
         hosts->takes_addresses ? ", or an address in digits" : "", shown);
     return 421;
 }

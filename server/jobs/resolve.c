@@ -333,9 +333,9 @@ static Status record_refuse_unknown(Db *db, const char *name, const char *pointe
     text_fit(short_name, sizeof short_name, name);
     if (db_is_private(db)) {
         snprintf(fault.detail, sizeof fault.detail,
-                 "\"%s\" is a record of a daemon, and there is none here: give its file (--record "
+                 "\"%s\" is a record of a server, and there is none here: give its file (--record "
                  "FILE), or put the samples into the scene (impactd import FILE), or send it to a "
-                 "daemon (impactd submit)",
+                 "server (impactd submit)",
                  short_name);
         return problem_add_fault(problem, STATUS_INVALID, &fault);
     }

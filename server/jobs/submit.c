@@ -256,7 +256,7 @@ static Status submit_finish(Entry *entry, Problem *problem) {
 // With the lock held: whether there is room in the queue.
 static Status submit_check_room(const JobManager *manager, const Job *job, Problem *problem) {
     if (manager->is_closing)
-        return problem_set(problem, STATUS_BUSY, "the daemon is stopping");
+        return problem_set(problem, STATUS_BUSY, "the server is stopping");
     if (manager->live >= manager->settings.queue_most)
         return problem_set(problem, STATUS_BUSY,
                            "the queue is full: of unfinished jobs it has %zu, and may have %zu",

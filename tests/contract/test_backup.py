@@ -185,7 +185,7 @@ def test_a_file_that_is_there_is_kept():
         for target in (own, own + "-wal", own + "-shm", own + "-journal", link, hard,
                        os.path.join(daemon.data, "impactd.late"), os.path.join(daemon.data, ".", "impactd.lock")):
             code, said = backup(target, daemon.data, "--force")
-            assert code == 1 and "the daemon's own file" in said, (target, code, said)
+            assert code == 1 and "the server's own file" in said, (target, code, said)
         os.unlink(hard)
         for target, expected, words in ((folder, 1, "name a file in it"), ("/dev/null", 1, "not a regular file"),
                                         (os.path.join(folder, "no", "x.db"), 1, "No such file"),

@@ -5,7 +5,7 @@ import { createStore } from "./ui/store.js";
 // What a problem document says (RFC 9457), or that nobody answered (status 0).
 class Refusal extends Error {
   constructor(status, { title, detail = title, errors = [] }) {
-    super(detail ?? `the service answered ${status}`);
+    super(detail ?? `the server answered ${status}`);
     Object.assign(this, { status, title, errors }); // errors: [{pointer, value, detail, unit, did_you_mean}]
   }
 }
@@ -29,7 +29,7 @@ async function send(method, path, { json, body, type, headers, query, signal }) 
     return await fetch(url, { method, headers: sent, body: json ? JSON.stringify(json) : body, signal });
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Refusal(0, { title: "The service does not answer", detail: "Is the daemon running? Nothing is lost here." });
+    throw new Refusal(0, { title: "The server does not answer", detail: "Is it running? Nothing is lost here." });
   }
 }
 

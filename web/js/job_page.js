@@ -29,7 +29,7 @@ export const page = {
       if (document.activeElement === cancelButton && !isGoing) change.focus();
       bar.value = progress;
       bar.hidden = cancelButton.hidden = !isGoing;
-      fill(told, job.isLost && notice("warn", "The service does not answer; the run continues when it is back"),
+      fill(told, job.isLost && notice("warn", "The server does not answer; the run continues when it is back"),
         job.problem && failure(job.problem),
         job.result_deleted && notice("info", "Its result was deleted"));
       // Before, its scene alone runs.

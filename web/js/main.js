@@ -59,7 +59,7 @@ const askToken = once(() => new Promise((resolve) => {
   const input = h("input", { type: "password", autocomplete: "off", required: true });
   const button = (text, value) => h("button", { value, formnovalidate: true }, text);
   const dialog = h("dialog", { onclose }, h("form", { method: "dialog" }, h("h2", null, "A token is asked for"),
-    h("p", null, "The administrator of this service creates one with ", h("code", null, "impactd token create"), "."),
+    h("p", null, "The administrator of this server creates one with ", h("code", null, "impactd token create"), "."),
     h("label", null, "Token ", input), h("div.row", null, h("button.primary", { value: "use" }, "Use it"),
       button("Not now", ""), token() && button("Forget the one in use", "forget"))));
   function onclose() {
