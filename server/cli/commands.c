@@ -91,7 +91,7 @@ static int cite_run(const Command *self, void *settings, const Options *options,
                program_version, engine_version);
     else
         printf("@software{impactd,\n"
-               "  author  = {{The impactd developers}},\n"
+               "  author  = {{The impactd authors}},\n"
                "  title   = {{impactd}: simulation of structures with impact dampers},\n"
                "  year    = {2026},\n"
                "  version = {%s},\n"
