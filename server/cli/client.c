@@ -234,6 +234,7 @@ int api_command(const Command *self, void *settings, const Options *options, Pro
     const char *pointer = problem->count > 0 ? problem->faults[0].pointer : "";
     if (status == STATUS_USAGE && (pointer[0] == '-' || pointer[0] == 'I'))
         return command_error(self->name, problem);
+    scene_edit_name_axes(self, call.settings, problem);
     command_print_faults(input_name(call.about), ": ", "\"", problem);
     return command_exit(status);
 }

@@ -88,6 +88,8 @@ Status command_data_folder(char **folder, Problem *problem);
                 "repeatable: a grid")
 // Applies --set and --vary, if the command has them, to the scene's text. STATUS_USAGE.
 Status scene_edit(const Command *self, const void *settings, Bytes *text, Problem *problem);
+// Names the faults of axes that came from --vary by that option.
+void scene_edit_name_axes(const Command *self, const void *settings, Problem *problem);
 
 // The exit code of a Status.
 int command_exit(Status status);

@@ -62,8 +62,10 @@ int input_command(const Command *self, const char *what, const Options *options,
     bytes_clear(&text);
     if (!is_edited && status == STATUS_USAGE)
         return command_error(self->name, problem);
-    if (status != STATUS_OK)
+    if (status != STATUS_OK) {
+        scene_edit_name_axes(self, settings, problem);
         command_print_faults(input_name(path), ": ", "\"", problem);
+    }
     return command_exit(status);
 }
 

@@ -515,14 +515,22 @@ static void optimum_report(Report *report, const Variant *answer) {
     const OptimumBest *best = &optimum->best;
     for (size_t i = 0; i < best->objectives.count; i++) {
         const OptimumObjective *objective = &best->objectives.at[i];
-        const double change =
-            100 * (objective->value / optimum->given.metrics.of[objective->metric] - 1);
+        const double given = optimum->given.metrics.of[objective->metric];
+        const double change = 100 * (objective->value / given - 1);
         const char *unit = study_metric_unit(objective->metric);
-        report_sentence(report, "Best %s of %llu candidates: %.6g%s%s, %.3g %% %s than as given.",
+        char than[80];
+        if (objective->value == given)
+            snprintf(than, sizeof than, "the same as given");
+        else if (!isfinite(change))
+            snprintf(than, sizeof than, "as given %.6g", given);
+        else
+            snprintf(than, sizeof than, "%.3g %% %s than as given", fabs(change),
+                     change < 0 ? "lower" : "higher");
+        report_sentence(report, "Best %s of %llu candidates: %.6g%s%s, %s.",
                         study_metric_names[objective->metric],
                         (unsigned long long)optimum->candidates, objective->value,
-                        unit != NULL ? " " : "", unit != NULL ? unit : "", fabs(change),
-                        change < 0 ? "lower" : "higher");
+                        unit != NULL ? " " : "", unit != NULL ? unit : "",
+                        isnan(given) ? "not defined as given" : than);
     }
     list_add(report, answer->kind->fields, answer,
              &(ReportList){"best.values", "Best values", "pointer=variable|value", NULL, false, 0});

@@ -51,12 +51,17 @@ static const char *dimension_name(const char *si) {
     return "a number";
 }
 
-// Whether two units are the same but for blanks, dots and asterisks between factors.
+// Whether two units are the same but for blanks and asterisks between factors; U+00B5 and U+03BC
+// in `b` are "u".
 static bool unit_same(const char *a, const char *b) {
     static const char between[] = " *";
     for (;; a++, b++) {
         a += strspn(a, between);
         b += strspn(b, between);
+        if (*a == 'u' && (strncmp(b, "\xC2\xB5", 2) == 0 || strncmp(b, "\xCE\xBC", 2) == 0)) {
+            b++;
+            continue;
+        }
         if (*a != *b || *a == '\0')
             return *a == *b;
     }
