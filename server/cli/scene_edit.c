@@ -110,16 +110,16 @@ static Status scene_edit_axis(const SceneEdit *edit, const Field *row, bool is_t
                                edit->value);
         const bool is_count = is_range && i == 2;
         if (is_count && value[strspn(value, "0123456789")] != '\0')
-            return problem_add(problem, STATUS_USAGE, edit->place,
-                               "must have a whole number as its COUNT, as in 5mm:30mm:26, is %.100s",
-                               edit->value);
+            return problem_add(
+                problem, STATUS_USAGE, edit->place,
+                "must have a whole number as its COUNT, as in 5mm:30mm:26, is %.100s", edit->value);
         bytes_text(json, is_range ? names[i] : i > 0 ? ", " : "");
         TRY(scene_edit_value(edit, is_count ? &count_row : row, !is_count && is_tag,
                              is_count ? NULL : unit, value, json, problem));
-        const int marked = is_count ? -1 : scene_edit_has_unit(value);
+        const int marked = !is_range || is_count ? -1 : scene_edit_has_unit(value);
         if (unit != NULL && has_unit >= 0 && marked >= 0 && marked != has_unit)
             return problem_add(problem, STATUS_USAGE, edit->place,
-                               "must have a unit at every number or at none, as 5mm:30mm:26, is "
+                               "must have a unit at both ends or at none: write 5mm:30mm:26, is "
                                "%.100s",
                                edit->value);
         has_unit = marked >= 0 ? marked : has_unit;

@@ -164,6 +164,47 @@ static unsigned char text_colour(const ChartSeries *series) {
     return series->colour == CHART_STRONG ? 0 : text_colours[series->colour % CHART_COLOURS];
 }
 
+// Without colours each of several lines has a letter, which stands on it and in the legend: "a", or
+// NULL. `count` is that of the lines with a legend, `index` this one's place among them.
+static const char *text_letter(const TextCanvas *canvas, const ChartSeries *series, size_t *index,
+                               size_t *count) {
+    static const char *const letters[] = {"a", "b", "c", "d", "e", "f", "g", "h"};
+    const ChartSeries *const all = canvas->panel->series;
+    *index = *count = 0;
+    for (size_t i = 0; i < canvas->panel->count; i++) {
+        const bool is_line = all[i].kind == CHART_LINE && all[i].legend != NULL;
+        *count += is_line;
+        *index += is_line && &all[i] < series;
+    }
+    return canvas->form->has_colour || series->kind != CHART_LINE || series->legend == NULL ||
+                   *count < 2 || *index >= COUNT(letters)
+               ? NULL
+               : letters[*index];
+}
+
+// Three times, at places where no other line has its letter.
+static void text_put_letters(const TextCanvas *canvas, const ChartSeries *series) {
+    enum { TIMES = 3 };
+    size_t index, count;
+    const char *letter = text_letter(canvas, series, &index, &count);
+    for (size_t k = 0; letter != NULL && k < TIMES; k++) {
+        const double wanted =
+            ((double)(index + k * count) + 0.5) / (double)(TIMES * count) * (canvas->width - 1);
+        size_t nearest = series->count;
+        double distance = (double)INFINITY;
+        for (size_t i = 0; i < series->count; i++)
+            if (chart_axis_shows(&canvas->panel->x, series->x[i]) && !isnan(series->y[i]) &&
+                fabs(text_x(canvas, series->x[i]) - wanted) < distance) {
+                distance = fabs(text_x(canvas, series->x[i]) - wanted);
+                nearest = i;
+            }
+        const double y = nearest < series->count ? text_y(canvas, series->y[nearest]) : -1;
+        if (distance < canvas->width / 8.0 && y > -0.5 && y < canvas->height - 0.5)
+            text_cell(canvas, (int)(text_x(canvas, series->x[nearest]) + 0.5), (int)(y + 0.5))
+                ->glyph = letter;
+    }
+}
+
 static void text_put_series(const TextCanvas *canvas, const ChartSeries *series) {
     const unsigned char colour = text_colour(series);
     if (series->kind == CHART_MARKERS)
@@ -175,6 +216,7 @@ static void text_put_series(const TextCanvas *canvas, const ChartSeries *series)
     text_put_line(canvas, series, series->y, colour);
     if (series->high != NULL)
         text_put_line(canvas, series, series->high, colour);
+    text_put_letters(canvas, series);
 }
 
 // --- labels ---
@@ -304,9 +346,12 @@ static void text_put_legend(const TextCanvas *canvas, size_t used, Bytes *bytes)
             continue;
         bytes_text(bytes, "  ");
         text_paint(canvas->form, text_colour(series), bytes);
-        bytes_text(bytes, series->kind == CHART_MARKERS ? text_glyph(canvas, series->shape)
-                          : canvas->form->is_utf8       ? "\u2500"
-                                                        : "-");
+        size_t index, lines;
+        const char *letter = text_letter(canvas, series, &index, &lines);
+        bytes_text(bytes, letter != NULL                  ? letter
+                          : series->kind == CHART_MARKERS ? text_glyph(canvas, series->shape)
+                          : canvas->form->is_utf8         ? "\u2500"
+                                                          : "-");
         text_paint(canvas->form, 0, bytes);
         bytes_format(bytes, " %s", series->legend);
         used += width;

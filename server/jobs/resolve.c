@@ -72,8 +72,9 @@ static Status material_refuse_unknown(Db *db, const char *name, const char *slug
                         sizeof list);
         material_slugs_clear(&slugs);
     }
-    snprintf(fault.detail, sizeof fault.detail, "no material is called \"%s\"%s%s", short_name,
-             list[0] != '\0' ? "; there are " : "", list);
+    snprintf(fault.detail, sizeof fault.detail, "no material is called \"%s\"%s%s%s", short_name,
+             list[0] != '\0' ? "; there are " : "", list,
+             db_is_private(db) ? "; a name with its numbers may be any" : "");
     return problem_add_fault(problem, STATUS_INVALID, &fault);
 }
 
@@ -293,6 +294,12 @@ static Status resolve_buffer(Db *db, Buffer *buffer, const char *pointer, Warnin
     Status status = db_material_shared(db, slug, revision, &found, NULL);
     if (status == STATUS_OK)
         status = material_fill(buffer, &found->revision, pointer, warnings, problem);
+    else if (status == STATUS_NOT_FOUND && db_is_private(db) &&
+             (!isnan(buffer->restitution) || buffer->table.count > 0))
+        status = warnings_add(warnings, pointer,
+                              "%.80s is not a built-in material: the numbers given with the "
+                              "name are used",
+                              buffer->material);
     else if (status == STATUS_NOT_FOUND)
         status = material_refuse(db, buffer->material, slug, revision, pointer, problem);
     if (found != NULL)

@@ -121,10 +121,30 @@ def test_vary_makes_a_sweep():
     answer = json.loads(out)
     assert code == 0 and "impacts" in answer["columns"] and "peak_displacement" not in answer["columns"] and answer["axes"][0]["values"] == [1000, 2000], answer
     for option, expected in [("duration=1:10", "must be FROM:TO:COUNT"), ("duration=1:10:3:lin", "must be FROM:TO:COUNT"),
-                             ("duration=1:10g:3", "10g is a mass"), ("duration=1:10:3s", "has no unit, 3s is a time"),
+                             ("duration=1:10g:3", "10g is a mass"), ("duration=1:10:3s", "a whole number as its COUNT"),
+                             ("duration=1:10:300%", "a whole number as its COUNT"), ("duration=0x1:10:3", "\"x1\" is not a unit"),
                              ("duratoin=1:2:3", "did you mean duration?")]:
         code, _, errors = program.run("sweep", SPONGE, "--vary", option)
         assert code == 2 and "--vary " + option.split("=")[0] in errors and expected in errors, (option, errors)
+
+
+def test_faults_of_an_axis_name_their_option():
+    """What the service finds in an axis of --vary is at that option."""
+    for option, expected in [("dampers.0.buffer=sponge,nylon", "--vary dampers.0.buffer: no material is called"),
+                             ("dampers.0.clearance=-5mm:30mm:3", "--vary dampers.0.clearance: point 0")]:
+        code, _, errors = program.run("sweep", SPONGE, "--vary", option)
+        assert code == 3 and expected in errors, errors
+
+
+def test_a_material_of_a_server_is_a_label_of_its_numbers():
+    """A scene of a server names a material that is unknown here: its numbers are used, with a warning; without them it is a fault."""
+    scene = program.scene("paper_free_sponge")
+    scene["dampers"][0]["buffer"] = {"material": "felt@1", "restitution": 0.61, "contact_time": 0.025}
+    code, out, errors = program.run("run", "-", "--json", text=json.dumps(scene))
+    assert code == 0 and "felt@1 is not a built-in material" in errors and json.loads(out)["summary"]["impacts"] == 22, errors
+    scene["dampers"][0]["buffer"] = "felt"
+    code, _, errors = program.run("run", "-", text=json.dumps(scene))
+    assert code == 3 and "a name with its numbers" in errors, errors
 
 
 def test_a_number_with_its_unit_in_a_scene_is_explained():

@@ -40,7 +40,7 @@ def test_run_prints_the_numbers_of_its_json_within_the_terminal():
     bare = summary["rms_displacement"] / (1 - summary["rms_displacement_reduction"])
     assert {digits(bare), digits(-100 * summary["rms_displacement_reduction"])} <= found, out
     words = " ".join(out.replace(" \\\n", " ").split())
-    assert "The damper lowers the rms displacement by 30.8 %, lowers the rms acceleration by 36.3 %." in words, out
+    assert "The damper lowers the rms displacement by 30.8 %, the rms acceleration by 36.3 %. Unchanged: peak displacement, peak acceleration." in words, out
     derived = job["plan"]["derived"][0]
     assert {digits(derived[name]) for name in ("restitution", "contact_time", "stiffness", "damping")} <= found, out
     assert "sponge@1" in found and "the whole run is predictable" in words and "6 of 22 impacts" in words
@@ -93,6 +93,9 @@ def studies():
     yield "optimize", {**free, "study": {"kind": "optimize", "variables": [clearance], "max_candidates": 30, "objectives": [
         {"metric": "rms_displacement"}]}}, [
         "Best rms_displacement of 30 candidates: ", "than as given", "/dampers/0/clearance", "Gain", "candidate"]
+    yield "optimize", {**free, "duration": 1, "study": {"kind": "optimize", "max_candidates": 10, "objectives": [{"metric": "impacts"}],
+        "variables": [{"pointer": "/dampers/0/clearance", "from": 0.5, "to": 1}]}, "dampers": [{**free["dampers"][0], "clearance": 0.6}]}, [
+        "Best impacts of 10 candidates: 0, the same as given."]
     yield "calibrate", program.scene("calibrate_free_sponge"), [
         "Verdict: explained", "/dampers/0/buffer/restitution", "0.6", "yes", "Residuals", "fitted", "measured"]
     yield "response", {**program.scene("response_sponge"), "study": {

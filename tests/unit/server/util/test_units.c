@@ -23,6 +23,7 @@ TEST(a_quantity_is_the_same_double_as_its_digits_in_si) {
     assert_true(read_in("kg", "1350g") == 1.35);
     assert_true(read_in("kg", "0.11 t") == 110);
     assert_true(read_in("s", "300us") == 0.0003);
+    assert_true(read_in("s", "300\xC2\xB5s") == 0.0003 && read_in("m", "15\xCE\xBCm") == 15e-6);
     assert_true(read_in("s", "2min") == 120);
     assert_true(read_in("Hz", "1.5kHz") == 1500);
     assert_true(read_in("N/m", "12N/mm") == 12000);
