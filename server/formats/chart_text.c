@@ -329,7 +329,7 @@ static void text_put_axis(const TextCanvas *canvas, size_t margin, const TextLab
     bytes_clear(&below);
 }
 
-// The legends that fit, behind the heading of `used` characters or else on a line of their own.
+// The legends, behind the heading of `used` characters or else on lines of their own.
 static void text_put_legend(const TextCanvas *canvas, size_t used, Bytes *bytes) {
     const ChartPanel *panel = canvas->panel;
     size_t total = used;
@@ -342,8 +342,12 @@ static void text_put_legend(const TextCanvas *canvas, size_t used, Bytes *bytes)
     for (size_t i = 0; i < panel->count && panel->count > 1; i++) {
         const ChartSeries *series = &panel->series[i];
         const size_t width = series->legend != NULL ? text_width(series->legend) + 4 : 0;
-        if (width == 0 || used + width > canvas->form->columns)
+        if (width == 0 || width > canvas->form->columns)
             continue;
+        if (used + width > canvas->form->columns) {
+            bytes_text(bytes, "\n");
+            used = 0;
+        }
         bytes_text(bytes, "  ");
         text_paint(canvas->form, text_colour(series), bytes);
         size_t index, lines;
