@@ -47,12 +47,17 @@ const plain = (text) => text.toLowerCase();
 const SYNONYMS = [
   [/\blicens(e|ing)\b/g, "licence"], [/\b(log-?in|passwords?|api[ -]?keys?)\b/g, "token"], [/\breverse proxy\b/g, "proxy"],
   [/\bsse\b/g, "events"], [/\bcitations?\b/g, "cite"], [/\bhow long\b.*/g, "cost"],
+  [/\b(directions?|orientation)\b/g, "sign"], [/\bfloors?\b/g, "storey"], [/\bnew (contact )?(model|law)\b/g, "add law"],
 ];
+const FILLERS = new Set("a an and are be can do does for from how i in is it my of on or the there to what when where which why with".split(" "));
 // "authentication" finds "authenticate": long words are looked for without their ending.
 const stem = (word) => word.replace(/^(.{4,}?)(ations?|ions?|ing|ed|es|s|e)$/, "$1");
+// The words that count, without their endings; all of them where no other is there.
 const asked = () => {
   const text = SYNONYMS.reduce((now, [from, to]) => now.replace(from, to), plain(words.value));
-  return text.split(/\s+/).map((word) => word.replace(/^[^\p{L}\p{N}_/-]+|[^\p{L}\p{N}_/]+$/gu, "")).filter(Boolean).map(stem);
+  const all = text.split(/\s+/).map((word) => word.replace(/^[^\p{L}\p{N}_/-]+|[^\p{L}\p{N}_/]+$/gu, "")).filter(Boolean);
+  const counted = all.filter((word) => !FILLERS.has(word));
+  return (counted.length > 0 ? counted : all).map(stem);
 };
 async function read() {
   index ??= get("search.json").then((pages) => pages.flatMap(([page, title, sections]) => sections.map(([anchor, heading, text]) =>
@@ -66,18 +71,19 @@ const escape = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
 // Words are looked for at their beginning: "sign" does not find "design".
 const begins = (...wanted) => new RegExp(`(?<![\\p{L}\\p{N}])(${wanted.map(escape).join("|")})`, "iu");
 
-// How well a section fits all words, 0 where one is missing: a heading counts more than a title, and that more than
-// the text; the reference of the API counts less than other pages.
+// How well a section fits the words, 0 where more than half of them are missing: a heading counts more than a title, and that more
+// than the text; the reference of the API counts less than other pages.
 function score({ low, anchor, weight }, wanted) {
-  let sum = 0;
+  let sum = 0, missing = 0;
   for (const word of wanted) {
     const start = begins(word);
     const one = (low.heading === word ? 60 : start.test(low.heading) ? 40 : 0)
       + (anchor && start.test(low.title) ? 8 : 0) + (start.test(low.text) ? 4 : 0);
-    if (one === 0) return 0;
+    missing += one === 0;
     sum += one;
   }
-  return weight * (sum + (low.heading.includes(wanted.join(" ")) ? 30 : low.text.includes(wanted.join(" ")) ? 6 : 0) + (anchor ? 0 : 5));
+  if (2 * missing > wanted.length || sum === 0) return 0;
+  return weight * 0.2 ** missing * (sum + (low.heading.includes(wanted.join(" ")) ? 30 : low.text.includes(wanted.join(" ")) ? 6 : 0) + (anchor ? 0 : 5));
 }
 
 const marked = (text, wanted) => text.split(begins(...wanted)).map((part, i) => (i % 2 ? h("mark", null, part) : part));
