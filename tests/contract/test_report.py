@@ -161,6 +161,14 @@ def check_page(path, title):
     return page, charts
 
 
+def test_a_gain_over_nothing_has_no_percentage():
+    """A change from zero impacts is no percentage; it is said in words."""
+    code, out = program.on_terminal(
+        "optimize", os.path.join(program.EXAMPLES, "optimize_clearance.json"), "--set", 'study.objectives=[{"metric":"impacts"}]',
+        "--set", "dampers.0.clearance=5", "--set", "study.max_candidates=10", "--set", "study.over.runs=4", "--set", "duration=5")
+    assert code == 0 and "as given 0." in out and not re.search(r"\b(nan|inf)\b", out), out
+
+
 def test_reports_are_pages_that_stand_alone():
     """`run` and a study write one valid page with their numbers, charts, impacts, decisions and scene; titles are escaped."""
     title = "<script>alert(\"1 & 2\")</script>"
