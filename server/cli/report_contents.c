@@ -527,8 +527,8 @@ static void optimum_report(Report *report, const Variant *answer) {
         char than[80];
         if (objective->value == given)
             snprintf(than, sizeof than, "the same as given");
-        else if (!isfinite(change))
-            snprintf(than, sizeof than, "as given %.6g", given);
+        else if (!isfinite(change) || change > 200)
+            snprintf(than, sizeof than, "%.6g as given", given);
         else
             snprintf(than, sizeof than, "%.3g %% %s than as given", fabs(change),
                      change < 0 ? "lower" : "higher");
