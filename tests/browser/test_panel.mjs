@@ -1,0 +1,54 @@
+// A result's first screen: what is answered there without scrolling, how much of it plots cover, how soon the first chart is there.
+import assert from "node:assert/strict";
+import { says, test, until } from "./support.mjs";
+
+const inView = (locator) => locator.evaluate((node) => {
+  const { top, bottom, left, right, height } = node.getBoundingClientRect();
+  return height > 0 && top >= 0 && left >= 0 && bottom <= innerHeight && right <= innerWidth;
+});
+
+test("Whether the damper helps is read without scrolling, on a screen and on a phone", async ({ daemon, newPage, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  for (const viewport of [{ width: 1280, height: 900 }, { width: 390, height: 844 }]) {
+    const page = await newPage({ viewport });
+    await page.goto(url(`#/results/${result}`));
+    for (const [label, value] of [["Motion, rms", "−30.8 %"], ["Motion, peak", "no change"], ["Acceleration, rms", "−36.3 %"], ["Impacts", "22"],
+      ["Largest force", "5.718 N"], ["Accuracy", "× 10"]]) {
+      const item = page.locator(".headlines > div").filter({ hasText: label });
+      await says(item, new RegExp(value.replace(".", "\\.")));
+      assert.ok(await inView(item), `${label} at ${viewport.width} px`);
+    }
+  }
+});
+
+test("Plots cover at least 45 % of the first screen", async ({ page, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  await page.goto(url(`#/results/${result}`));
+  await until("the charts", async () => (await page.locator(".plot svg path.line").count()) >= 5);
+  const share = await page.evaluate(() => {
+    let area = 0;
+    for (const node of document.querySelectorAll(".plot, .drawing")) {
+      const { top, bottom, width } = node.getBoundingClientRect();
+      area += Math.max(0, Math.min(bottom, innerHeight) - Math.max(top, 0)) * width;
+    }
+    return area / (innerWidth * innerHeight);
+  });
+  console.log(`      plots and the drawing cover ${(100 * share).toFixed(1)} % of 1280 x 900`);
+  assert.ok(share >= 0.45, `${share}`);
+});
+
+test("The first chart of a result comes with the processor slowed down 4 times", async ({ page, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  const session = await page.context().newCDPSession(page);
+  await session.send("Emulation.setCPUThrottlingRate", { rate: 4 });
+  await page.addInitScript(() => {
+    const watch = () => {
+      if (!document.querySelector(".plot path.line")) return requestAnimationFrame(watch);
+      requestAnimationFrame(() => (window.firstChart = performance.now()));
+    };
+    watch();
+  });
+  await page.goto(url(`#/results/${result}`));
+  const time = await until("the first chart", () => page.evaluate(() => window.firstChart));
+  console.log(`      the first chart came after ${Math.round(time)} ms`);
+});
