@@ -65,7 +65,7 @@ static Status material_refuse_unknown(Db *db, const char *name, const char *slug
                                       const char *pointer, Problem *problem) {
     Fault fault = resolve_fault(pointer, name);
     Texts slugs;
-    char short_name[80], list[200] = "";
+    char short_name[80], list[160] = "";
     text_fit(short_name, sizeof short_name, name);
     if (problem->count < SUGGESTED && db_material_slugs(db, &slugs, NULL) == STATUS_OK) {
         resolve_suggest(&fault, slug, slugs.at, slugs.count, sizeof *slugs.at, 0, list,
