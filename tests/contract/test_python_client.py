@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -310,7 +311,7 @@ def test_requests_are_repeated_where_that_is_safe():
         assert refused(impactd.connect(url, patience=1).submit, {}).status == 503 and len(seen) == 2
     with fake(version, say(404, b"<html>not here</html>", "text/html")) as (url, _):
         assert "not here" in str(refused(impactd.connect(url).material, "sponge"))
-    with fake(say(body=b"{}")) as (url, seen):
+    with fake(say(body=b'{"version": "1"}')) as (url, seen):
         lab = impactd.connect(url + "/base/")
         lab.request("GET", "/v1/cache")
         lab.request("GET", "/base/v1/cache")
@@ -359,6 +360,26 @@ def test_mistakes_of_the_caller_are_named():
         assert "in this result. It has" in str(raised(AttributeError, lambda: r.zzz))
     problem = impactd.Problem({"title": "a\x1b[2J", "detail": "b\u202ec\n", "errors": [{"pointer": "/\x9b", "detail": "d\r"}]})
     assert str(problem) == "a\\x1b[2J (about:blank, status 0)\n  b\\u202ec\\n\n  /\\x9b: d\\r", str(problem)
+
+
+def test_answers_of_others_are_one_exception():
+    """What is no answer of impactd raises UnexpectedAnswer: no JSON, absent members, endless lists, tables that are cut; problems can be pickled."""
+    version = say(body=b'{"version": "1"}')
+    job = {"id": "j-1", "status": "failed", "progress": 0, "result": None, "problem": None}
+    with fake(version, say(body=b"<html>"), say(body=b"[]"), say(body=b'{"id": 1}'), say(body=b'{"jobs": [1]}'),
+              say(body=b'{"jobs": []}', Link='</v1/jobs?limit=100>; rel="next"'), say(body=json.dumps(job).encode()),
+              say(body=json.dumps({**job, "status": "dismissed"}).encode())) as (url, _):
+        lab = impactd.connect(url, timeout=5)
+        for call, text in ((lambda: lab.job("j-1"), "is not JSON: '<html>'"), (lambda: lab.job("j-1"), "has no member 'id'"),
+                           (lambda: lab.job("j-1"), "has no member 'status'"), (lab.jobs, "no list 'jobs' of objects"), (lab.jobs, "leads back to itself")):
+            assert text in str(raised(impactd.UnexpectedAnswer, call)), text
+        for kind in ("internal-error", "cancelled"):
+            problem = refused(lab.job("j-1").result)
+            assert problem.type == f"/problems/{kind}" and str(pickle.loads(pickle.dumps(problem))) == str(problem), problem
+    with fake(version, say(body=b'{"version": "1"}' + b" " * (1 << 20))) as (url, _), unittest.mock.patch.object(impactd, "_MOST", 1 << 16):
+        assert "larger than 65536 bytes" in str(raised(impactd.UnexpectedAnswer, impactd.connect(url, timeout=5).examples))
+    with fake(version) as (url, _):
+        assert "cannot have" in str(raised(ValueError, impactd.connect(url).request, "GET", "/v1/jobs/a b\r\nX: y"))
 
 
 def test_one_client_serves_many_threads():

@@ -39,7 +39,7 @@ from array import array
 from typing import Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence, Union
 
 __version__ = "0.1.0"
-__all__ = ["connect", "Lab", "Job", "Result", "Study", "Problem", "Fault", "Spectrum"]
+__all__ = ["connect", "Lab", "Job", "Result", "Study", "Problem", "UnexpectedAnswer", "Fault", "Spectrum"]
 
 Scene = Union[Mapping[str, Any], str, "os.PathLike[str]", "Result"]
 Progress = Union[bool, Callable[[int, int], Any]]
@@ -50,6 +50,10 @@ _SCENE_MEMBERS = ("structure", "dampers", "contact", "excitation", "duration", "
 _THREADS = 8        # requests at a time in submit and gather
 _WAIT = 20          # [s] that one request waits for a job
 _RETRIES = 4        # of a request whose connection failed
+_PAGES = 10000      # of one list
+_MOST = 1 << 30     # [bytes] of an answer that is kept in memory
+_CHUNK = 1 << 16    # [bytes] that are read at a time
+_PATIENCE = 20      # times the timeout in which a whole answer must be here
 
 
 # --- errors ---
@@ -96,7 +100,7 @@ class Problem(Exception):
         self.detail: str = document.get("detail") or ""
         self.faults = [Fault(fault.get("pointer") or _place(fault), fault.get("detail", ""), fault.get("value"),
                              fault.get("unit"), fault.get("did_you_mean"))
-                       for fault in document.get("errors") or []]
+                       for fault in document.get("errors") or [] if isinstance(fault, collections.abc.Mapping)]
         self.job = job
         super().__init__(self.title)
 
@@ -105,6 +109,14 @@ class Problem(Exception):
         if self.detail and not any(self.detail.endswith(fault.detail) for fault in self.faults):
             lines.append(f"  {_clean(self.detail)}")
         return "\n".join(lines + [f"  {fault}" for fault in self.faults])
+
+
+    def __reduce__(self) -> Any:  # for another process; a job has a connection and stays here
+        return type(self), (self.document, self.status)
+
+
+class UnexpectedAnswer(Exception):
+    """An answer that impactd does not give: something else may answer at this address."""
 
 
 def _place(fault: Mapping[str, Any]) -> str:
@@ -235,9 +247,9 @@ def _read_npy(data: bytes) -> list[Any]:
     """The columns of an NPY file of float64 in Fortran order, which is what the server writes."""
     size = int.from_bytes(data[8:10], "little")
     found = re.search(rb"'shape': \((\d+), (\d+)\)", data[10:10 + size])
-    if found is None:
-        raise ValueError("the answer is not a table of numbers in NumPy's format")
-    count, start, columns = int(found[1]), 10 + size, []
+    count, start, columns = int(found[1]) if found else 0, 10 + size, []
+    if found is None or len(data) != start + 8 * count * int(found[2]):
+        raise UnexpectedAnswer("the answer is not a whole table of numbers in NumPy's format")
     numpy = _optional("numpy")
     for c in range(int(found[2])):
         part = memoryview(data)[start + 8 * count * c:start + 8 * count * (c + 1)]
@@ -277,8 +289,17 @@ class _Reply(NamedTuple):
     headers: Any
     body: bytes
 
-    def json(self) -> Any:
-        return json.loads(self.body)
+    def json(self, path: str = "", has: Sequence[str] = ()) -> Any:
+        """The document, an object with these members where some are named."""
+        try:
+            document = json.loads(self.body)
+        except (ValueError, RecursionError):
+            text = _clean(self.body[:60].decode("utf-8", "replace"))
+            raise UnexpectedAnswer(f"the answer of {path} is not JSON: {text!r}") from None
+        absent = [name for name in has if not isinstance(document, dict) or name not in document]
+        if absent:
+            raise UnexpectedAnswer(f"the answer of {path} has no member {absent[0]!r}")
+        return document
 
 
 def _address(url: str) -> tuple[urllib.parse.SplitResult, Optional[int]]:
@@ -343,9 +364,29 @@ class _Http:
         """A link of an answer, or a path of the API, as this server is reached. Never another host."""
         parts = urllib.parse.urlsplit(link)
         path = parts.path if parts.path.startswith(self.base + "/") else self.base + parts.path
+        if re.search(r"[^!-~]", path + parts.query):
+            raise ValueError(f"{_clean(path)!r} has blanks or characters that a path cannot have")
         return path + ("?" + parts.query if parts.query else "")
 
-    def send(self, method: str, path: str, body: Optional[bytes], headers: Mapping[str, str], is_safe: bool) -> _Reply:
+    def read(self, connection: http.client.HTTPConnection, answer: http.client.HTTPResponse, file: Any) -> bytes:
+        """The body, in time and within its bound; written to `file` where one is given."""
+        end, size, parts = time.monotonic() + _PATIENCE * self.timeout, 0, []
+        while True:
+            part = answer.read1(_CHUNK) if answer.chunked else answer.read(_CHUNK)
+            if not part:
+                return b"".join(parts)
+            size += len(part)
+            if file is not None:
+                file.write(part)
+            elif size > _MOST:
+                raise UnexpectedAnswer(f"an answer is larger than {_MOST} bytes: save it to a file, or ask for a part")
+            else:
+                parts.append(part)
+            if file is None and time.monotonic() > end:
+                raise TimeoutError(f"an answer of {self.url} is not complete after {_PATIENCE * self.timeout:g} s")
+
+    def send(self, method: str, path: str, body: Optional[bytes], headers: Mapping[str, str], is_safe: bool,
+             file: Any = None) -> _Reply:
         """One exchange. A connection that the server closed meanwhile is replaced if the request may be repeated."""
         with self.lock:
             connection = self.idle.pop() if self.idle and is_safe else None
@@ -354,11 +395,11 @@ class _Http:
         try:
             connection.request(method, path, body, headers)
             answer = connection.getresponse()
-            reply = _Reply(answer.status, answer.headers, answer.read())
+            reply = _Reply(answer.status, answer.headers, self.read(connection, answer, file if answer.status == 200 else None))
         except BaseException as error:
             connection.close()
             if is_reused and isinstance(error, (ConnectionError, http.client.BadStatusLine)):
-                return self.send(method, path, body, headers, is_safe)
+                return self.send(method, path, body, headers, is_safe, file)
             raise
         if answer.will_close:
             connection.close()
@@ -368,9 +409,10 @@ class _Http:
         return reply
 
     def request(self, method: str, link: str, body: Optional[bytes] = None,
-                headers: Optional[Mapping[str, str]] = None) -> _Reply:
+                headers: Optional[Mapping[str, str]] = None, file: Any = None) -> _Reply:
         """The answer below 400, else raises Problem. Repeats what may be repeated: after 429 and 503 at the time that
-        the server names, after a failed connection GET, DELETE and POST with an Idempotency-Key."""
+        the server names, after a failed connection GET, DELETE and POST with an Idempotency-Key. The body is written to
+        `file` where one is given."""
         all_headers = {"Accept": "*/*", "User-Agent": f"impactd-python/{__version__}", **(headers or {})}
         if self.token:
             all_headers["Authorization"] = f"Bearer {self.token}"
@@ -378,7 +420,10 @@ class _Http:
         path, end, failures, hops = self.path(link), time.monotonic() + self.patience, 0, 0
         while True:
             try:
-                reply = self.send(method, path, body, all_headers, is_safe)
+                if file is not None:
+                    file.seek(0)
+                    file.truncate()
+                reply = self.send(method, path, body, all_headers, is_safe, file)
             except ssl.SSLCertVerificationError as error:
                 raise ConnectionError(f"the certificate of {self.url} is not trusted: {error.verify_message}; "
                                       "name the file of its authority as ca_file") from error
@@ -406,26 +451,34 @@ class _Http:
     def problem(reply: _Reply) -> tuple[dict[str, Any], int]:
         try:
             document = reply.json()
-        except ValueError:
+        except UnexpectedAnswer:
             document = None
         if not isinstance(document, dict):
             document = {"detail": reply.body[:500].decode("utf-8", "replace").strip()}
         return document, reply.status
 
-    def json(self, method: str, link: str, document: Any = None, headers: Optional[Mapping[str, str]] = None) -> Any:
+    def json(self, method: str, link: str, document: Any = None, headers: Optional[Mapping[str, str]] = None,
+             has: Sequence[str] = ()) -> Any:
         body, all_headers = None, dict(headers or {})
         if document is not None:
             body = _encode(document)
             all_headers["Content-Type"] = "application/json"
         reply = self.request(method, link, body, all_headers)
-        return reply.json() if reply.body else None
+        return reply.json(link, has) if reply.body or has else None
 
     def pages(self, link: str, name: str, limit: Optional[int] = None) -> list[dict[str, Any]]:
         """The items of all pages of a list."""
         items: list[dict[str, Any]] = []
+        seen: set[str] = set()
         while link and (limit is None or len(items) < limit):
+            if link in seen or len(seen) == _PAGES:
+                raise UnexpectedAnswer(f"the list has more than {_PAGES} pages, or its page {_clean(link)!r} leads back to itself")
+            seen.add(link)
             reply = self.request("GET", link)
-            items += reply.json()[name]
+            page = reply.json(link, (name,))[name]
+            if not isinstance(page, list) or not all(isinstance(one, dict) for one in page):
+                raise UnexpectedAnswer(f"the answer of {_clean(link)} has no list {name!r} of objects")
+            items += page
             found = re.search(r'<([^>]*)>\s*;\s*rel="?next', reply.headers.get("Link") or "")
             link = found[1] if found else ""
         return items if limit is None else items[:limit]
@@ -438,7 +491,7 @@ def _query(path: str, **values: Any) -> str:
 
 
 def _name(text: str) -> str:
-    return urllib.parse.quote(text, safe="@")
+    return urllib.parse.quote(str(text), safe="@")
 
 
 class _Progress:
@@ -492,6 +545,10 @@ def _parallel(work: Callable[[Any], Any], items: Sequence[Any]) -> Iterator[tupl
 
 # --- jobs and results ---
 
+_JOB = ("id", "status", "progress", "result")  # members that are used of a job, and of a result
+_RESULT = ("id", "scene", "summary", "plan", "warnings", "units", "channels")
+
+
 class Job:
     """A submitted scene. `job.result()` waits for its result; `job.id` is its id on the server.
 
@@ -518,7 +575,8 @@ class Job:
 
     def refresh(self, wait: float = 0) -> Job:
         """Asks for the state; with `wait` the answer comes when the job is finished, or after so many seconds."""
-        self.document = self._lab._http.json("GET", f"/v1/jobs/{self.id}" + (f"?wait={wait:g}" if wait else ""))
+        path = f"/v1/jobs/{_name(self.id)}" + (f"?wait={wait:g}" if wait else "")
+        self.document = self._lab._http.json("GET", path, has=_JOB)
         return self
 
     def wait(self, timeout: Optional[float] = None) -> Job:
@@ -535,14 +593,16 @@ class Job:
         """Waits, and returns the Result, of a study the Study. Raises Problem where the job failed or was cancelled."""
         self.wait(timeout)
         if self.status != "successful":
-            cancelled = {"title": f"Job {self.id} is {self.status}", "type": "/problems/cancelled", "status": 409}
-            raise Problem(self.document.get("problem") or cancelled, job=self)
+            kind = "cancelled" if self.status == "dismissed" else "internal-error"
+            plain = {"title": f"Job {self.id} is {self.status}", "type": f"/problems/{kind}", "status": 409}
+            document = self.document.get("problem")
+            raise Problem(document if isinstance(document, dict) and document else plain, job=self)
         return (Study if self.document.get("study") else Result)(self._lab, self.document["result"], self.document)
 
     def cancel(self) -> Job:
         """Stops the job; one that is finished stays as it is."""
         try:
-            self.document = self._lab._http.json("DELETE", f"/v1/jobs/{self.id}")
+            self.document = self._lab._http.json("DELETE", f"/v1/jobs/{_name(self.id)}", has=_JOB)
         except Problem as problem:
             if problem.status != 409:
                 raise
@@ -584,12 +644,13 @@ class Result:
         return self._kept[key]
 
     def _part(self, name: str) -> str:
-        return f"/v1/results/{self.id}/{name}"
+        return f"/v1/results/{_name(self.id)}/{name}"
 
     @property
     def document(self) -> dict[str, Any]:
         """The whole document of the result, as GET /v1/results/{id} answers it."""
-        return self._get("document", lambda: self._lab._http.json("GET", f"/v1/results/{self.id}"))
+        return self._get("document", lambda: self._lab._http.json(
+            "GET", f"/v1/results/{_name(self.id)}", has=_RESULT))
 
     def _of_job(self, name: str) -> Any:
         return self._job[name] if self._job and self._job.get(name) is not None else self.document[name]
@@ -683,7 +744,8 @@ class Result:
     def impacts(self) -> Any:
         """The list of impacts: a DataFrame, or a list of dicts. start, end, duration [s], speeds [m/s], peak_force [N],
         impulse [N s], energy_lost [J]; "kind" is "impact", or "resting" for an interval of lasting contact."""
-        return self._get("impacts", lambda: _table(self._lab._http.json("GET", self._part("impacts.json"))["impacts"]))
+        return self._get("impacts", lambda: _table(self._lab._http.json(
+            "GET", self._part("impacts.json"), has=("impacts",))["impacts"]))
 
     def impact(self, number: int, points: Optional[int] = None) -> Any:
         """One impact in detail, numbered from 1: a table of the contact force over time."""
@@ -695,7 +757,8 @@ class Result:
 
             frequency, density = r.psd("mean_acceleration")     # [Hz], [(m/s^2)^2/Hz]
         """
-        document = self._get("psd", lambda: self._lab._http.json("GET", self._part("psd.json")))
+        document = self._get("psd", lambda: self._lab._http.json(
+            "GET", self._part("psd.json"), has=("frequency", "channels")))
         channels = document["channels"]
         channel = channel or next(iter(channels))
         if channel not in channels:
@@ -724,17 +787,16 @@ class Result:
         """
         path = os.fspath(path)
         extension = os.path.splitext(path)[1][1:].lower()
-        if extension == "zip":
-            data = self._lab._http.request("GET", self._part("bundle.zip")).body
-        elif extension == "json" and part is None:
-            data = _encode(self._whole())
-        else:
-            data = self._lab._http.request("GET", self._part(f"{part or self._table_part}.{_name(extension)}")).body
+        name = "bundle.zip" if extension == "zip" else f"{_name(part or self._table_part)}.{_name(extension)}"
+        whole = _encode(self._whole()) if extension == "json" and part is None else None
         folder = os.path.dirname(os.path.abspath(path))
         handle, draft = tempfile.mkstemp(prefix=".impactd-", dir=folder)
         try:
             with open(handle, "wb") as file:
-                file.write(data)
+                if whole is None:
+                    self._lab._http.request("GET", self._part(name), file=file)
+                else:
+                    file.write(whole)
             mask = os.umask(0)
             os.umask(mask)
             os.chmod(draft, 0o666 & ~mask)
@@ -981,7 +1043,7 @@ class Lab:
         self._http = _Http(url, token, ca_file, timeout, patience)
         self._cancels = cancel_on_interrupt
         self._examples: dict[str, Any] = {}
-        self.version: dict[str, Any] = self._http.json("GET", "/version")
+        self.version: dict[str, Any] = self._http.json("GET", "/version", has=("version",))
 
     @property
     def url(self) -> str:
@@ -1008,7 +1070,7 @@ class Lab:
 
     def examples(self) -> list[str]:
         """Names of the scenes that come with the server."""
-        return [one["name"] for one in self._http.json("GET", "/v1/examples")["examples"]]
+        return [one["name"] for one in self._http.json("GET", "/v1/examples", has=("examples",))["examples"]]
 
     @staticmethod
     def _file(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
@@ -1056,7 +1118,7 @@ class Lab:
     def _post(self, scene: Mapping[str, Any], prefer: str, key: Optional[str] = None) -> Job:
         # A retry under the same key cannot run the scene twice.
         headers = {"Idempotency-Key": key or uuid.uuid4().hex, "Prefer": prefer}
-        return Job(self, self._http.json("POST", "/v1/jobs", scene, headers))
+        return Job(self, self._http.json("POST", "/v1/jobs", scene, headers, _JOB))
 
     def _finish(self, scene: Mapping[str, Any], timeout: Optional[float], progress: Progress) -> Result:
         key, job = uuid.uuid4().hex, None
@@ -1267,11 +1329,11 @@ class Lab:
 
     def job(self, id: str) -> Job:
         """A job by its id, which may be shortened to "j-" and eight digits."""
-        return Job(self, self._http.json("GET", f"/v1/jobs/{_name(id)}"))
+        return Job(self, self._http.json("GET", f"/v1/jobs/{_name(id)}", has=_JOB))
 
     def result(self, id: str) -> Result:
         """A result or a study by its id, which may be shortened to "r-" and eight digits."""
-        document = self._http.json("GET", f"/v1/results/{_name(id)}")
+        document = self._http.json("GET", f"/v1/results/{_name(id)}", has=_RESULT)
         result = (Study if document.get("study") else Result)(self, document["id"])
         result._kept["document"] = document
         return result
