@@ -94,9 +94,18 @@ const EmbeddedFile *guide_files;
 
 Status guide_show(App *app, const Request *request, Reply *reply, Problem *problem) {
     (void)app;
-    const bool is_index = strcmp(request->path, "/guide/") == 0;
-    return asset_reply(guide_files, is_index ? "guide/index.html" : request->path + 1, request,
-                       reply, problem);
+    static const char index[] = "guide/index.html";
+    static const char *const accepted[] = {"application/problem+json", "text/html", NULL};
+    const char *path = request->path[strlen("/guide/")] == '\0' ? index : request->path + 1;
+    if (guide_files != NULL && embedded_find(guide_files, path) == NULL &&
+        header_accept(request->accept, accepted) == 1) { // a reader gets what leads on
+        const EmbeddedFile *file = embedded_find(guide_files, index);
+        reply->varies_by_accept = true;
+        reply_borrow(reply, 404, asset_type(index), file->bytes, file->size);
+        reply->policy = reply_page_policy;
+        return STATUS_OK;
+    }
+    return asset_reply(guide_files, path, request, reply, problem);
 }
 
 // The type of a problem document is an address: the section of the guide on that problem.

@@ -30,12 +30,15 @@ typedef struct Reply Reply;
 typedef Status Handler(App *app, const Request *request, Reply *reply, Problem *problem);
 
 // One endpoint.
+extern const char *const any_query[];
+
 typedef struct Route {
     const char *method; // "GET"
     // "/v1/results/{id}/series.{format}": {x} matches one segment or the rest of one
     const char *pattern;
     const char *scope;          // "read", "submit", "materials", "admin"; "open": needs no token
     const char *const *queries; // names allowed in the query, NULL-terminated; NULL for none
+                                // any_query: all, which pages for people ignore
     const char *doc;
     Handler *handle;
     // Whether the handler is so quick that it may run on the event loop; NULL: never.

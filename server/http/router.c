@@ -191,9 +191,13 @@ static Status router_refuse(const Router *router, const Request *request, const 
                        base_path());
 }
 
+const char *const any_query[] = {NULL};
+
 static Status router_check_queries(const Route *route, const Request *request, Problem *problem) {
     static const char *const none[] = {NULL};
     const char *const *allowed = route->queries != NULL ? route->queries : none;
+    if (allowed == any_query)
+        return STATUS_OK;
     for (size_t i = 0; i < request->query_count; i++) {
         const char *name = request->queries[i].name;
         size_t at = 0;

@@ -123,6 +123,18 @@ def test_every_question_mark_of_the_dashboard_leads_to_a_section():
     assert '<a href="guide/">Guide</a>' in read("web", "index.html")
 
 
+def test_pages_for_people_ignore_queries_and_wrong_addresses_lead_on():
+    """Links with a query of others work; a browser gets the guide's first page at a wrong address, other clients the problem."""
+    browser = {"Accept": "text/html,*/*;q=0.8"}
+    with program.daemon() as daemon:
+        for path in ("/guide/", "/guide/concepts.html", "/client/impactd.py", "/client", "/web/style.css", "/"):
+            assert daemon.get(path + "?utm_source=a&x=1", headers=browser).status == 200, path
+        assert daemon.get("/version?utm_source=a").status == 400
+        page = daemon.get("/guide/nothing.html", headers=browser)
+        assert page.status == 404 and page.body == daemon.get("/guide/").body and page.headers["content-type"].startswith("text/html"), page
+        assert daemon.get("/guide/nothing.html").json()["type"] == "/problems/not-found"
+
+
 def test_links_of_readme_lead_somewhere():
     """Files, folders, pictures and anchors, here and in pages of the guide; likewise links of the guide to files of the sources."""
     for source in ["README.md", *(f"web/guide/{name}.md" for name in pages())]:
