@@ -94,7 +94,15 @@ Status client_files_show(App *app, const Request *request, Reply *reply, Problem
                            request->parameters[0], base_path());
     Bytes wheel = {.most = app->reply_most};
     TRY(wheel_write(&wheel, problem));
-    return reply_bytes(reply, 200, "application/zip", &wheel, problem);
+    unsigned char sum[DIGEST_BYTES];
+    char digest[65];
+    sha256_sum(wheel.at, wheel.count, sum);
+    sha256_hex(sum, digest);
+    digest[32] = '\0'; // as of files
+    if (!reply_tagged(reply, request, digest))
+        return reply_bytes(reply, 200, "application/zip", &wheel, problem);
+    bytes_clear(&wheel);
+    return STATUS_OK;
 }
 
 // A page as in PEP 503: pip takes the wheel by its link.

@@ -90,7 +90,10 @@ def test_the_wheel_is_the_file_and_always_the_same():
     bodies = []
     for _ in range(2):
         with program.daemon() as daemon:
-            bodies.append(daemon.get(f"/client/{WHEEL}").body)
+            whole = daemon.get(f"/client/{WHEEL}")
+            same = daemon.get(f"/client/{WHEEL}", headers={"If-None-Match": whole.headers["etag"]})
+            assert same.status == 304 and same.body == b"", same
+            bodies.append(whole.body)
             served = daemon.get("/client/impactd.py")
             page = daemon.get("/client").body.decode()
             assert daemon.get("/client/").headers["location"] == "/client"
