@@ -31,7 +31,7 @@ try {
   // The README's picture: what one sees of a result first.
   const result = list.find(({ name }) => name === "result");
   if (result) {
-    const page = await (await browser.newContext({ viewport: { width: 1280, height: 1060 }, colorScheme: "light" })).newPage();
+    const page = await (await browser.newContext({ viewport: { width: 1280, height: 900 }, colorScheme: "light" })).newPage();
     await settle(page, `${daemon.url}/${result.hash}`, result);
     await page.screenshot({ path: path.join(folder, "dashboard.png"), animations: "disabled" });
   }

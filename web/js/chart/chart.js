@@ -61,9 +61,10 @@ function valueDomain(y, series, rules, domain) {
 //   group                charts of one group share the cursor
 //   onPick               called with (series, index) of the point that was clicked
 //   isCompact            the numbers of x are left out: another chart stands below
+//   isShort              the heading names x too, so that no line below does
 //   underlay, children   further SVG below and above the series, from the plot {x, y, left, right, top, bottom}: scales, pixels
 export function Chart(props) {
-  const { title, description, x, y, height = 200, isCompact = false } = props;
+  const { title, description, x, y, height = 200, isCompact = false, isShort = false } = props;
   const { spans = [], rules = [], markers = [], underlay, children } = props;
   const id = useMemo(() => freshId("chart"), []);
   const box = useRef(null);
@@ -117,11 +118,13 @@ export function Chart(props) {
 
   const xTitle = axisUnit(x, domain).title;
   const yTitle = axisUnit({ ...y, label: y.label ?? title }, yScale.domain).title;
+  const both = isShort ? `${yTitle} over ${lower(xTitle)}` : yTitle;
+  const heading = y.categories ? title : both;
   const plot = { x: xScale, y: yScale, left, right, top, bottom };
   const summary = description ?? describe(props.series, x, y, domain);
   return html`<figure class="chart" aria-label=${title}>
     <div class="chart-head">
-      <h3>${y.categories ? title : yTitle}</h3>
+      <h3>${heading}</h3>
       ${
         props.series.length > 1 &&
         html`<${Legend} series=${props.series} hidden=${hidden} setHidden=${setHidden} />`
@@ -173,11 +176,14 @@ export function Chart(props) {
         y=${y}
       />
     </div>
-    ${!isCompact && html`<p class="x-title" aria-hidden="true">${xTitle}</p>`}
+    ${!isCompact && !isShort && html`<p class="x-title" aria-hidden="true">${xTitle}</p>`}
     <p class="visually-hidden" id=${`${id}-summary`}>${summary}</p>
     ${hasNumbers && html`<${DataTable} title=${title} series=${props.series} x=${x} y=${y} />`}
   </figure>`;
 }
+
+// "Time [ms]" as "time [ms]".
+const lower = (text) => text.replace(/^./, (letter) => letter.toLowerCase());
 
 // A sentence with the ranges of what is shown.
 function describe(series, x, y, domain) {

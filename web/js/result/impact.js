@@ -136,18 +136,20 @@ function ForceCharts({ row, history }) {
   return html`
     <${Chart}
       title="Contact force over time"
-      height=${110}
-      x=${{ label: "Time since contact", unit: "s" }}
-      y=${{ label: "Contact force", unit: "N" }}
+      height=${100}
+      isShort
+      x=${{ label: "Time", unit: "s" }}
+      y=${{ label: "Force", unit: "N" }}
       series=${series}
     />
     ${
       row.kind === "impact" &&
       html`<${Chart}
         title="Contact force over penetration"
-        height=${110}
+        height=${100}
+        isShort
         x=${{ label: "Penetration", unit: "m" }}
-        y=${{ label: "Contact force", unit: "N" }}
+        y=${{ label: "Force", unit: "N" }}
         series=${[{ label: "force", color: "force", x: depth, y: force }]}
       />`
     }
