@@ -161,6 +161,7 @@ test("A revision is reviewed, compared and reverted; who writes second is told w
   await says(main(page), /Felt approved/);
   await says(page.getByRole("region", { name: "Trail" }), /Approved revision 2: agrees with the sheet .*Wrote revision 2: measured anew/s);
   await page.getByRole("link", { name: "Revision 1", exact: true }).click();
+  await says(main(page), /felt@1 of 2/); // the page before has the same differences
   await says(page.getByRole("region", { name: "From revision 1 to revision 2" }), /Restitution\s+0\.3\s+0\.33/);
   refused(412);
   await daemon.ask("POST", "/v1/materials/felt/revisions", { ...felt, restitution: 0.35, comment: "a third sheet" }, { "If-Match": "*" });
