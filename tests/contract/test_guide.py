@@ -129,7 +129,7 @@ def test_pages_for_people_ignore_queries_and_wrong_addresses_lead_on():
     with program.daemon() as daemon:
         for path in ("/guide/", "/guide/concepts.html", "/client/impactd.py", "/client", "/web/style.css", "/"):
             assert daemon.get(path + "?utm_source=a&x=1", headers=browser).status == 200, path
-        assert daemon.get("/version?utm_source=a").status == 400
+        assert daemon.get("/v1/jobs?utm_source=a").status == 400
         page = daemon.get("/guide/nothing.html", headers=browser)
         assert page.status == 404 and page.body == daemon.get("/guide/").body and page.headers["content-type"].startswith("text/html"), page
         assert daemon.get("/guide/nothing.html").json()["type"] == "/problems/not-found"
