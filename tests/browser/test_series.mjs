@@ -9,7 +9,7 @@ const motion = (page) => page.getByRole("region", { name: "Motion over time" });
 test("Zoom by keys moves every chart and the address; back undoes it; another reader sees the same", async ({ page, newPage, daemon, url }) => {
   const { result } = await daemon.run("paper_free_sponge");
   await page.goto(url(`#/results/${result}?from=0&to=10`));
-  await says(figure(page, "Contact force"), /Time from 0 s to 10 s; with the damper between −5\.716 N/);
+  await says(figure(page, "Contact force"), /Time from 0 s to 10 s; contact force between −5\.716 N/);
   await chartOf(page, "Displacement").focus();
   await page.keyboard.press("+");
   await says(figure(page, "Contact force"), /from 2\.5 s to 7\.5 s/);

@@ -12,6 +12,7 @@ import { channelNames, useResult, windowOf } from "./context.js";
 import { seriesOf, timeOfEnergy, useSeries } from "./series.js";
 
 const MOST_MARKERS = 300;
+const MOST_LINES = 4; // of one chart
 const QUIET_PART = 0.7; // where the motion dies before this part of the run, only that much is shown at first
 
 // One colour for each quantity, from the drawing to the legend: variables of style.css.
@@ -88,29 +89,31 @@ const buffers = ({ clearance, offset }) =>
     </g>`;
   };
 
+// Of many storeys the lowest, the middle and the highest.
+function picked(channels) {
+  const last = channels.length - 1;
+  return last < MOST_LINES
+    ? channels
+    : [channels[0], channels[Math.round(last / 2)], channels[last]];
+}
+
 function seriesFor(chart, { time, columns }, bare) {
   if (chart.damper) {
     const [own, carrier] = chart.channels.map((channel) => columns.get(channel));
-    if (own.values) {
-      const relative = own.values.map((value, at) => value - carrier.values[at]);
-      return [{ label: "free mass", color: "damper", x: time, y: relative }];
-    }
-    // Of buckets only bounds are known.
-    const low = own.low.map((value, at) => value - carrier.high[at]);
-    const high = own.high.map((value, at) => value - carrier.low[at]);
-    return [{ kind: "band", label: "free mass, at most", color: "damper", x: time, low, high }];
+    const relative = own.values.map((value, at) => value - carrier.values[at]);
+    return [{ label: "free mass", color: "damper", x: time, y: relative }];
   }
-  const drawn = chart.channels.slice(0, 8);
+  const drawn = picked(chart.channels);
+  const ghost = chart.key === "displacement" && bare !== null;
   const series = drawn.map((channel, at) => {
     const color = drawn.length > 1 ? `c${at + 1}` : quantityColor(channel);
-    const label =
-      drawn.length > 1 ? `${words(chart.key)} ${numberOf(channel) ?? at + 1}` : "with the damper";
+    const single = ghost ? "with the damper" : words(chart.key);
+    const label = drawn.length > 1 ? `${words(chart.key)} ${numberOf(channel) ?? at + 1}` : single;
     return seriesOf(label, color, time, columns.get(channel));
   });
-  const isTop = chart.key === "displacement";
-  if (isTop && bare)
-    series.unshift(seriesOf("without damper", "ghost", bare.time, bare.column, { dash: false }));
-  return series;
+  if (!ghost) return series;
+  const storey = drawn.length > 1 ? ` (${numberOf(drawn.at(-1))})` : "";
+  return [seriesOf(`without damper${storey}`, "ghost", bare.time, bare.column), ...series];
 }
 
 export function Motion() {
@@ -132,7 +135,7 @@ export function Motion() {
   const loaded = useSeries({ path, result, channels, window, pixels });
   const bare = useBare(
     result,
-    channels.find((channel) => wordOf(channel) === "displacement") ?? "displacement",
+    channels.findLast((channel) => wordOf(channel) === "displacement") ?? "displacement",
   );
   const impacts = useLoaded(
     () => ledger.window(window.from, window.to, MOST_MARKERS),
@@ -158,6 +161,7 @@ export function Motion() {
   const horizon = result.summary.trust_horizon;
   const spans =
     horizon === null ? [] : [{ from: horizon, to: window.end, label: "only statistics hold here" }];
+  const unlabelled = spans.map((span) => ({ ...span, label: "" }));
   const isCut = impacts.data && impacts.data.count > impacts.data.impacts.length;
   const markers =
     isCut || !impacts.data
@@ -175,14 +179,23 @@ export function Motion() {
       ? [{ x: instant, label: "", color: "accent" }]
       : [];
   // Data of charts that were just chosen may be on their way.
-  const drawable = shown.filter((chart) =>
-    chart.channels.every((name) => loaded.data?.columns.has(name)),
+  const isEnvelope = loaded.data?.isEnvelope ?? false;
+  const drawable = shown.filter(
+    (chart) =>
+      chart.channels.every((name) => loaded.data?.columns.has(name)) &&
+      !(chart.damper && isEnvelope), // of a difference buckets know no bounds
   );
+  const many = drawable.find((chart) => picked(chart.channels) !== chart.channels);
   const remarks = [
     isAuto &&
       quiet &&
       `The first ${quantity(quiet, "s")} of ${quantity(window.end, "s")} hold almost all of the motion.`,
-    loaded.data?.isEnvelope &&
+    isEnvelope &&
+      shown.some((chart) => chart.damper) &&
+      "Zoom in to see the free mass between its stops.",
+    many && `The lowest, the middle and the highest of ${many.channels.length} are drawn.`,
+    charts.length === 0 && "The scene asked for no channels.",
+    isEnvelope &&
       `Each pixel shows the least and the largest of ${number(loaded.data.bucket)} samples.`,
     isCut && `${number(impacts.data.count)} contacts: zoom to ${MOST_MARKERS} to see them marked.`,
   ]
@@ -207,7 +220,7 @@ export function Motion() {
           onRange=${setRange}
           group="time"
           isCompact=${!isLast}
-          spans=${spans}
+          spans=${at === 0 ? spans : unlabelled}
           rules=${[...rules, ...(chart.damper ? walls(chart.damper) : [])]}
           markers=${at === 0 ? markers : []}
           underlay=${chart.damper && buffers(chart.damper)}
