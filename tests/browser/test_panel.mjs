@@ -1,6 +1,6 @@
 // A result's first screen: what is answered there without scrolling, how much of it plots cover, how soon the first chart is there.
 import assert from "node:assert/strict";
-import { says, test, until } from "./support.mjs";
+import { leads, says, test, until } from "./support.mjs";
 
 const inView = (locator) => locator.evaluate((node) => {
   const { top, bottom, left, right, height } = node.getBoundingClientRect();
@@ -51,4 +51,31 @@ test("The first chart of a result comes with the processor slowed down 4 times",
   await page.goto(url(`#/results/${result}`));
   const time = await until("the first chart", () => page.evaluate(() => window.firstChart));
   console.log(`      the first chart came after ${Math.round(time)} ms`);
+});
+
+test("The best clearance is two clicks away: the cost of the sweep, then its answer", async ({ page, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  await page.goto(url(`#/results/${result}`));
+  await page.getByRole("button", { name: "Sweep the clearance" }).click();
+  await says(page.getByRole("status").filter({ hasText: "runs" }), /41 runs with clearances from 3 mm to 45 mm: about [\d.]+ .?s of processor time/);
+  await page.getByRole("button", { name: "Start", exact: true }).click();
+  await leads(page, /#\/results\/r-(?!.*\?)/);
+  await says(page.getByRole("main"), /41 of 41 points/);
+});
+
+test("Further studies are in a menu, which Escape closes; a result without a damper offers what it can", async ({ page, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  await page.goto(url(`#/results/${result}`));
+  await page.getByRole("button", { name: "More studies" }).click();
+  await page.getByRole("button", { name: "Compare contact models" }).waitFor();
+  await page.keyboard.press("Escape");
+  await until("the menu to close", async () => (await page.getByRole("button", { name: "Compare contact models" }).count()) === 0);
+  await page.getByRole("button", { name: "More studies" }).click();
+  await page.getByRole("button", { name: "Compare contact models" }).click();
+  await says(page.getByRole("status").filter({ hasText: "contact model" }), /of processor time/);
+  await page.getByRole("button", { name: "Not now" }).click();
+  const bare = await daemon.run("no_damper");
+  await page.goto(url(`#/results/${bare.result}`));
+  await page.getByRole("button", { name: "Error against cost" }).waitFor();
+  assert.equal(await page.getByRole("button", { name: "Sweep the clearance" }).count(), 0);
 });

@@ -14,6 +14,7 @@ import { ResultHeadlines } from "./headlines.js";
 import { ImpactPanel } from "./impact.js";
 import { ImpactTable } from "./impacts.js";
 import { Section } from "./legacy.js";
+import { StudyButtons, StudyStart } from "./studies.js";
 import { Method } from "./method.js";
 import { Motion } from "./motion.js";
 import { Spectrum } from "./spectrum.js";
@@ -162,6 +163,8 @@ function ResultPage({ address, signal }) {
     attempt,
   );
   const name = jobs.data?.find((job) => job.title)?.title ?? "Result";
+  const [chosen, setChosen] = useState(null); // a study, before it starts
+  const hasStudies = loaded.data && !loaded.data.study;
   return html`<div class="result">
     <div class="title-row">
       <h1>${name}</h1>
@@ -172,9 +175,11 @@ function ResultPage({ address, signal }) {
             >Change this scene</a
           >
           <a class="button" href=${link("compare", { a: loaded.data.id })}>Compare with …</a>
+          ${hasStudies && html`<${StudyButtons} scene=${loaded.data.scene} onChoose=${setChosen} />`}
         </div>`
       }
     </div>
+    ${chosen && html`<${StudyStart} scene=${loaded.data.scene} chosen=${chosen} onClose=${() => setChosen(null)} />`}
     ${jobs.error && html`<${Failure} error=${jobs.error} />`}
     <${Loaded} loaded=${loaded}>
       ${(result) => html`<${result.study ? StudyView : ResultView} result=${result} query=${address.query} signal=${signal} />`}
