@@ -8,7 +8,7 @@ test("The trade is measured on the scene, chosen from by keyboard, known at once
   await page.getByLabel("Duration [s]").fill("1");
   const measure = page.getByRole("button", { name: "Measure the trade on this scene" });
   await measure.click();
-  let slider = page.getByRole("slider");
+  let slider = page.getByRole("slider", { name: /From the crudest/ });
   await slider.waitFor();
   await says(page.locator("body"), /Worth having: exact\. /);
   const before = page.url();
@@ -22,7 +22,7 @@ test("The trade is measured on the scene, chosen from by keyboard, known at once
   page = await newPage();
   await page.goto(shared);
   await page.getByRole("button", { name: "Measure the trade on this scene" }).click();
-  slider = page.getByRole("slider");
+  slider = page.getByRole("slider", { name: /From the crudest/ });
   await slider.waitFor();
   assert.match(await slider.getAttribute("aria-valuetext"), /Beaten/);
   await page.getByLabel("Solver", { exact: true }).selectOption("auto");

@@ -12,6 +12,8 @@ import { bufferWidget } from "./picker.js";
 import { recordWidget } from "./record_widget.js";
 import { sceneForm } from "./scene_form.js";
 import { keep, open, sponge } from "./scene_state.js";
+import { makeHistory } from "./scene/history.js";
+import { showLive } from "./scene/live.js";
 
 const widgets = [[/^\/dampers.*buffer$/, bufferWidget], [/^\/excitation\/name$/, recordWidget], [/^\/accuracy$/, accuracyWidget]];
 
@@ -37,13 +39,15 @@ function jsonView(draft) {
 async function show(host, address, signal) {
   const draft = makeDraft(sponge(), signal), json = jsonView(draft);
   const steps = h("div", null, "The form is on its way …"), drawn = h("div.panel.drawn");
-  const told = h("div"), state = h("p.hint", { role: "status" }), comes = h("div");
+  const live = h("div"), told = h("div"), state = h("p.hint", { role: "status" }), comes = h("div");
   const run = button("Run", () => runScene(), { class: "primary run", title: "Ctrl + Enter", "aria-keyshortcuts": "Control+Enter" });
   fill(host, help("Scene"), h("h1", null, "Scene"),
     h("p", null, "A free mass between two buffered stops in a structure: change what you like. ",
-      button("Examples", examplesDialog)), told,
-    h("div.scene", null, h("div", null, steps), h("div.beside", null, drawn,
-      h("div", null, h("p", null, run), panel("Estimate", state, comes)))));
+      button("Examples", examplesDialog), " ", run), told,
+    h("div.scene", null, h("div", null, steps), h("div.beside", null, drawn, live,
+      panel("Estimate", state, comes))));
+  const past = makeHistory(draft);
+  showLive(live, draft, past, signal);
   const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 
@@ -95,7 +99,14 @@ async function show(host, address, signal) {
     comes.querySelector(".bad")?.focus();
   });
   addEventListener("keydown", (event) => {
-    if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey)) return;
+    const isCommand = event.ctrlKey || event.metaKey;
+    // A field undoes what was typed in it by itself.
+    if (isCommand && event.key.toLowerCase() === "z" && !event.target.matches("input:not([type=range]), textarea")) {
+      event.preventDefault();
+      if (event.shiftKey) past.redo();
+      else past.undo();
+    }
+    if (event.key !== "Enter" || !isCommand) return;
     event.preventDefault();
     runScene();
   }, { signal });
@@ -112,6 +123,7 @@ async function show(host, address, signal) {
     draft.replace(scene);
     isEdited = wasEdited;
     isUnkept = false;
+    past.restart();
   }
   Promise.all([schema("scene"), load(address.query)]).then(([scene]) => {
     fill(steps);

@@ -1,0 +1,215 @@
+// The scene as it is edited, running: sliders for what matters most, the damper's effect, and the motion as it changes.
+import { html, render, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
+import { Chart } from "../chart/chart.js";
+import { IconButton } from "../ui/controls.js";
+import { number, quantity } from "../units.js";
+import { bareScene, makePreview, previewScene, samplesOf } from "./preview.js";
+
+const SPAN = 5; // a slider goes from a fifth of the value to five times it
+const STEPS = 400;
+const MOST_BUCKET = 0.03; // cycles of the first mode
+const MOST_COST = 0.05; // s of processor time that a preview may take
+const TOO_LONG = "This run is too long for a preview; Run shows it.";
+
+const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
+
+// The sliders of a scene: {label, pointer, unit, most}.
+function slidersOf({ dampers, excitation }) {
+  const found = [];
+  const damper = dampers?.[0];
+  if (isObject(damper)) {
+    found.push({ label: "Clearance", pointer: "/dampers/0/clearance", unit: "m" });
+    found.push({ label: "Free mass", pointer: "/dampers/0/mass", unit: "kg" });
+    if (isObject(damper.buffer) && !damper.buffer.material) {
+      found.push({
+        label: "Restitution e",
+        pointer: "/dampers/0/buffer/restitution",
+        unit: "1",
+        most: 1,
+      });
+      found.push({ label: "Contact time", pointer: "/dampers/0/buffer/contact_time", unit: "s" });
+    }
+  }
+  const units = { displacement: "m", velocity: "m/s" };
+  const base = units[excitation?.quantity] ?? "m/s^2";
+  for (const [label, name, unit] of [
+    ["Released at", "displacement", "m"],
+    ["Base amplitude", "amplitude", base],
+    ["Base rms", "rms", base],
+    ["Base frequency", "frequency", "Hz"],
+  ])
+    if (typeof excitation?.[name] === "number")
+      found.push({ label, pointer: `/excitation/${name}`, unit });
+  return found;
+}
+
+// A slider in equal ratios about the value that was there when it was last changed elsewhere.
+function Slider({ slider, draft, onMove }) {
+  const { label, pointer, unit, most = Infinity } = slider;
+  const value = draft.get(pointer);
+  const center = useRef(value);
+  const own = useRef(value);
+  if (value !== own.current) center.current = value;
+  own.current = value;
+  if (!(value > 0)) return null;
+  const place = Math.round((Math.log(value / center.current) / Math.log(SPAN)) * STEPS);
+  const move = (event) => {
+    const next = Number(
+      (center.current * SPAN ** (event.currentTarget.value / STEPS)).toPrecision(4),
+    );
+    own.current = Math.min(next, most);
+    draft.set(pointer, own.current);
+    onMove();
+  };
+  return html`<div class="live-slider">
+    <span>${label}</span>
+    <input
+      type="range"
+      min=${-STEPS}
+      max=${STEPS}
+      step="4"
+      value=${place}
+      aria-label=${`Slide: ${label}`}
+      aria-valuetext=${quantity(value, unit)}
+      onInput=${move}
+    />
+    <output>${quantity(value, unit)}</output>
+  </div>`;
+}
+
+// The free mass as the structure sees it, from the middles of buckets; null where these are too long for that.
+function relativeOf({ series, plan }, [carrier, own]) {
+  const { bucket = 1, sample_rate: rate } = series;
+  if ((bucket / rate) * (plan.modes[0]?.frequency ?? 0) > MOST_BUCKET) return null;
+  const middles = ({ values, min, max }) => values ?? min.map((low, at) => (low + max[at]) / 2);
+  const [a, b] = [carrier, own].map((channel) => middles(series.channels[channel]));
+  const x = Float64Array.from(a, (_, k) => series.start + ((k + 0.5) * bucket - 0.5) / rate);
+  return { x, y: b.map((value, at) => value - a[at]) };
+}
+
+function effectText({ summary }) {
+  const change = (part) => {
+    if (part === null || part === undefined) return "not known";
+    return Math.abs(part) < 5e-4
+      ? "unchanged"
+      : `${part > 0 ? "−" : "+"}${number(Math.abs(100 * part), 3)} %`;
+  };
+  const parts = [
+    `rms ${change(summary.rms_displacement_reduction)}`,
+    `peak ${change(summary.peak_displacement_reduction)}`,
+  ];
+  if (summary.impacts > 0) parts.push(`${number(summary.impacts)} impacts`);
+  if (summary.peak_contact_force > 0)
+    parts.push(`largest force ${quantity(summary.peak_contact_force, "N", 3)}`);
+  return parts.join(", ");
+}
+
+function Live({ draft, history, signal }) {
+  const [, redraw] = useReducer((count) => count + 1, 0);
+  const [answer, setAnswer] = useState({ data: null, error: null, channels: [], damper: null });
+  const [bare, setBare] = useState(null);
+  const [range, setRange] = useState(null);
+  const ask = useRef(() => {});
+  useEffect(() => {
+    let asked = {};
+    let bareAsked = {};
+    let lastBare = "";
+    const show = ({ data, error }) => setAnswer({ ...asked, data, error });
+    const preview = makePreview(show, signal);
+    const barePreview = makePreview(({ data }) => setBare(data && { ...bareAsked, data }), signal);
+    ask.current = () => {
+      asked = previewScene(draft.scene);
+      preview.ask(asked.scene);
+      const next = bareScene(draft.scene);
+      const text = JSON.stringify(next.scene);
+      if (text === lastBare) return;
+      lastBare = text;
+      bareAsked = next;
+      barePreview.ask(next.scene);
+    };
+    // What is typed is run once the service has found no fault in it; what a slider sets, at once.
+    const follow = ({ check }) => {
+      redraw();
+      if (!check) return;
+      if (check.cost.cpu_seconds <= MOST_COST) ask.current();
+      else setAnswer({ channels: [], damper: null, data: null, error: new Error(TOO_LONG) });
+    };
+    const ends = [draft.onChange(follow), history.onChange(redraw)];
+    return () => ends.forEach((end) => end());
+  }, [draft]);
+
+  const { data, error, channels, damper } = answer;
+  const isComplete = data && channels.every((channel) => data.series.channels[channel]);
+  const motion = useMemo(() => isComplete && samplesOf(data, channels[0]), [data]);
+  const ghost = useMemo(() => bare && samplesOf(bare.data, bare.channel), [bare]);
+  const relative = useMemo(() => isComplete && damper && relativeOf(data, channels), [data]);
+  const end = data ? (data.series.samples - 1) / data.series.sample_rate : 0;
+  const time = { label: "Time", unit: "s", domain: [0, end] };
+  const walls = damper
+    ? [-1, 1].map((side) => ({
+        y: (damper.offset ?? 0) + (side * damper.clearance) / 2,
+        label: side < 0 ? "left stop" : "right stop",
+        color: "wall",
+      }))
+    : [];
+  return html`<section class="panel live" aria-label="Live">
+    <div class="panel-head">
+      <h2>Live</h2>
+      <p class="live-effect" role="status">
+        ${data && damper ? `With the damper: ${effectText(data)}.` : ""}
+      </p>
+      <div class="actions">
+        <${IconButton} label="Undo (Ctrl+Z)" disabled=${!history.canUndo} onClick=${history.undo}
+          >Undo<//
+        >
+        <${IconButton}
+          label="Redo (Ctrl+Shift+Z)"
+          disabled=${!history.canRedo}
+          onClick=${history.redo}
+          >Redo<//
+        >
+      </div>
+    </div>
+    <div class="live-sliders">
+      ${slidersOf(draft.scene).map((slider) => html`<${Slider} key=${slider.pointer} slider=${slider} draft=${draft} onMove=${() => ask.current()} />`)}
+    </div>
+    ${error && html`<p class="hint">${error.status === 422 ? TOO_LONG : error.message}</p>`}
+    ${
+      isComplete &&
+      html`<${Chart}
+        title="Displacement"
+        height=${130}
+        x=${time}
+        y=${{ label: "Displacement", unit: "m" }}
+        range=${range}
+        onRange=${setRange}
+        group="live"
+        isCompact=${Boolean(relative)}
+        series=${[
+          ...(ghost && damper ? [{ label: "without damper", color: "ghost", ...ghost }] : []),
+          { label: damper ? "with the damper" : "displacement", color: "displacement", ...motion },
+        ]}
+      />`
+    }
+    ${
+      relative &&
+      html`<${Chart}
+        title="Free mass between its stops"
+        height=${110}
+        x=${time}
+        y=${{ label: "Free mass between its stops", unit: "m" }}
+        range=${range}
+        onRange=${setRange}
+        group="live"
+        rules=${walls}
+        series=${[{ label: "free mass", color: "damper", ...relative }]}
+      />`
+    }
+  </section>`;
+}
+
+// Shows the live view in `host` until the signal ends it.
+export function showLive(host, draft, history, signal) {
+  render(html`<${Live} draft=${draft} history=${history} signal=${signal} />`, host);
+  signal.addEventListener("abort", () => render(null, host));
+}

@@ -1,0 +1,84 @@
+// What a scene does while it is edited: runs that the service keeps nothing of, one at a time, always the newest scene.
+import { post } from "../api.js";
+
+const MOST_POINTS = 3000;
+
+// Keeps asking while scenes come: preview.ask(scene); `show({data, error})` after each answer. Stops with the signal.
+export function makePreview(show, signal) {
+  let wanted = null;
+  let isBusy = false;
+  async function run() {
+    if (isBusy || wanted === null || signal.aborted) return;
+    const scene = wanted;
+    wanted = null;
+    isBusy = true;
+    try {
+      show({
+        data: await post(`v1/preview?points=${MOST_POINTS}`, scene, { signal }),
+        error: null,
+      });
+    } catch (error) {
+      if (error.name !== "AbortError") show({ data: null, error });
+    }
+    isBusy = false;
+    run();
+  }
+  return {
+    ask(scene) {
+      wanted = scene;
+      run();
+    },
+  };
+}
+
+// The scene as it is previewed: without a study, with the channels that are drawn.
+export function previewScene(scene) {
+  const { study, title, labels, output, ...rest } = scene;
+  const { structure = {}, dampers = [] } = rest;
+  const storeys = [structure.masses ?? structure.mass].flat().length;
+  const isNumbered = storeys > 1 || dampers.length > 1;
+  const damper = dampers[0];
+  const storey = damper?.storey ?? storeys;
+  const name = (word, number) => (isNumbered ? `${word}_${number}` : word);
+  const channels = [
+    name("displacement", storey),
+    ...(damper ? [name("damper_displacement", 1)] : []),
+  ];
+  return { scene: { ...rest, output: { channels, impacts: false } }, channels, damper };
+}
+
+// The same without dampers: the exact solver does, whatever the scene asks for.
+export function bareScene(scene) {
+  const { study, title, labels, contact, accuracy, ...rest } = scene;
+  const { structure = {} } = rest;
+  const storeys = [structure.masses ?? structure.mass].flat().length;
+  const channel =
+    storeys > 1 ? `displacement_${rest.dampers?.[0]?.storey ?? storeys}` : "displacement";
+  return {
+    scene: { ...rest, dampers: [], output: { channels: [channel], impacts: false } },
+    channel,
+  };
+}
+
+// The samples of a channel as a chart takes them; of buckets the two ends, one after the other, so that no peak is lost.
+export function samplesOf({ series }, channel) {
+  const { start, count, bucket = 1, sample_rate: rate } = series;
+  const { values, min, max } = series.channels[channel];
+  const width = bucket / rate;
+  if (values || bucket === 1)
+    return {
+      x: Float64Array.from({ length: count }, (_, k) => start + k / rate),
+      y: values ?? min,
+    };
+  const x = new Float64Array(2 * count);
+  const y = new Float64Array(2 * count);
+  for (let k = 0; k < count; k++) {
+    // The order within a bucket is not known: that which goes on from the bucket before.
+    const isUp = k === 0 || Math.abs(min[k] - y[2 * k - 1]) <= Math.abs(max[k] - y[2 * k - 1]);
+    x[2 * k] = start + (k + 0.25) * width;
+    x[2 * k + 1] = start + (k + 0.75) * width;
+    y[2 * k] = isUp ? min[k] : max[k];
+    y[2 * k + 1] = isUp ? max[k] : min[k];
+  }
+  return { x, y };
+}
