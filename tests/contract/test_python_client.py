@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import traceback
 import unittest.mock
 import warnings
@@ -383,6 +384,42 @@ def test_answers_of_others_are_one_exception():
         assert "larger than 65536 bytes" in str(raised(impactd.UnexpectedAnswer, impactd.connect(url, timeout=5).examples))
     with fake(version) as (url, _):
         assert "cannot have" in str(raised(ValueError, impactd.connect(url).request, "GET", "/v1/jobs/a b\r\nX: y"))
+    running = {**job, "status": "running", "progress": "x"}
+    with fake(version, say(422, b'{"title": 5, "detail": {}, "status": "x", "errors": [1, {"pointer": 5, "detail": 7}]}'),
+              say(422, b'{"errors": 5}'), say(body=json.dumps({**job, "status": "successful"}).encode()), say(body=json.dumps(running).encode())) as (url, _):
+        lab = impactd.connect(url, timeout=5)
+        assert [str(refused(lab.job, "j-1")).split()[:3] for _ in range(2)] == [["HTTP", "status", "422"]] * 2
+        assert "has no result" in str(raised(impactd.UnexpectedAnswer, lab.job("j-1").result))
+        assert "is no number" in str(raised(impactd.UnexpectedAnswer, lambda: lab.job("j-1").progress))
+
+
+def test_answers_that_are_cut_or_too_slow_are_refused():
+    """A body that ends early is no answer, also not as a file; a body that comes in single bytes has an end; short timeouts are kept."""
+    def drip(handler):
+        handler.wfile.write(b"HTTP/1.1 200 OK\r\nContent-Length: 300\r\n\r\n")
+        for _ in range(300):
+            handler.wfile.write(b" ")
+            time.sleep(0.02)
+
+    def lab(url):
+        made = impactd.connect(url, timeout=0.2)
+        made._http.is_known = False  # so that nothing is repeated
+        return made
+
+    version = say(body=b'{"version": "1"}')
+    with fake(version, say(body=b"[1]", length=1000)) as (url, _), tempfile.TemporaryDirectory() as folder:
+        cut = lab(url)
+        raised(ConnectionError, cut.request, "GET", "/v1/cache")
+        raised(ConnectionError, impactd.Result(cut, "r-1").save, f"{folder}/a.csv")
+        assert os.listdir(folder) == []
+    with fake(version, drip) as (url, _), unittest.mock.patch.object(impactd, "_PATIENCE", 2):
+        begin = time.monotonic()
+        assert "not complete" in str(raised(ConnectionError, lab(url).request, "GET", "/v1/cache")) and time.monotonic() - begin < 3
+    job = {"id": "j-1", "status": "running", "progress": 5, "result": None}
+    with fake(version, say(body=json.dumps(job).encode())) as (url, seen):
+        slow = impactd.connect(url, timeout=1)
+        error = raised(TimeoutError, lambda: slow.run({}, timeout=0.1))
+        assert "j-1 is running (5 %) after 0.1 s" in str(error) and seen[1][2]["Prefer"] == "respond-async", (error, seen[1])
 
 
 def test_one_client_serves_many_threads():

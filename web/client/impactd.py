@@ -94,13 +94,14 @@ class Problem(Exception):
 
     def __init__(self, document: Mapping[str, Any], status: int = 0, job: Optional[Job] = None):
         self.document = dict(document)
-        self.status: int = document.get("status") or status
-        self.type: str = document.get("type") or "about:blank"
-        self.title: str = document.get("title") or f"HTTP status {self.status}"
-        self.detail: str = document.get("detail") or ""
-        self.faults = [Fault(fault.get("pointer") or _place(fault), fault.get("detail", ""), fault.get("value"),
+        own, errors = document.get("status"), document.get("errors")
+        self.status: int = own if isinstance(own, int) and own else status
+        self.type = _text(document, "type") or "about:blank"
+        self.title = _text(document, "title") or f"HTTP status {self.status}"
+        self.detail = _text(document, "detail")
+        self.faults = [Fault(_text(fault, "pointer") or _place(fault), _text(fault, "detail"), fault.get("value"),
                              fault.get("unit"), fault.get("did_you_mean"))
-                       for fault in document.get("errors") or [] if isinstance(fault, collections.abc.Mapping)]
+                       for fault in (errors if isinstance(errors, list) else []) if isinstance(fault, collections.abc.Mapping)]
         self.job = job
         super().__init__(self.title)
 
@@ -110,13 +111,17 @@ class Problem(Exception):
             lines.append(f"  {_clean(self.detail)}")
         return "\n".join(lines + [f"  {fault}" for fault in self.faults])
 
-
     def __reduce__(self) -> Any:  # for another process; a job has a connection and stays here
-        return type(self), (self.document, self.status)
+        return type(self), (self.document, self.status), {"title": self.title}
 
 
 class UnexpectedAnswer(Exception):
     """An answer that impactd does not give: something else may answer at this address."""
+
+
+def _text(document: Mapping[str, Any], name: str) -> str:
+    """A member that is a string, else an empty one."""
+    return document[name] if isinstance(document.get(name), str) else ""
 
 
 def _place(fault: Mapping[str, Any]) -> str:
@@ -368,14 +373,18 @@ class _Http:
             raise ValueError(f"{_clean(path)!r} has blanks or characters that a path cannot have")
         return path + ("?" + parts.query if parts.query else "")
 
-    def read(self, connection: http.client.HTTPConnection, answer: http.client.HTTPResponse, file: Any) -> bytes:
-        """The body, in time and within its bound; written to `file` where one is given."""
+    def read(self, answer: http.client.HTTPResponse, file: Any) -> bytes:
+        """The whole body, in time and within its bound; written to `file` where one is given."""
         end, size, parts = time.monotonic() + _PATIENCE * self.timeout, 0, []
-        while True:
-            part = answer.read1(_CHUNK) if answer.chunked else answer.read(_CHUNK)
+        left = answer.length  # None where the server did not name it
+        while left != 0:
+            part = answer.read1(_CHUNK if left is None else min(left, _CHUNK))  # read would wait for a full chunk
+            if not part and left is not None:  # http.client does not raise it for parts
+                raise http.client.IncompleteRead(b"", left)
             if not part:
-                return b"".join(parts)
+                break
             size += len(part)
+            left = None if left is None else left - len(part)
             if file is not None:
                 file.write(part)
             elif size > _MOST:
@@ -384,6 +393,8 @@ class _Http:
                 parts.append(part)
             if file is None and time.monotonic() > end:
                 raise TimeoutError(f"an answer of {self.url} is not complete after {_PATIENCE * self.timeout:g} s")
+        answer.close()  # the connection stays
+        return b"".join(parts)
 
     def send(self, method: str, path: str, body: Optional[bytes], headers: Mapping[str, str], is_safe: bool,
              file: Any = None) -> _Reply:
@@ -395,7 +406,7 @@ class _Http:
         try:
             connection.request(method, path, body, headers)
             answer = connection.getresponse()
-            reply = _Reply(answer.status, answer.headers, self.read(connection, answer, file if answer.status == 200 else None))
+            reply = _Reply(answer.status, answer.headers, self.read(answer, file if answer.status == 200 else None))
         except BaseException as error:
             connection.close()
             if is_reused and isinstance(error, (ConnectionError, http.client.BadStatusLine)):
@@ -567,7 +578,10 @@ class Job:
 
     @property
     def progress(self) -> float:
-        return self.document["progress"]
+        done = self.document["progress"]
+        if not isinstance(done, (int, float)):
+            raise UnexpectedAnswer(f"the progress of job {self.id} is no number: {_clean(done)[:60]!r}")
+        return done
 
     @property
     def is_finished(self) -> bool:
@@ -581,7 +595,9 @@ class Job:
 
     def wait(self, timeout: Optional[float] = None) -> Job:
         """Waits until the job is finished; TimeoutError after `timeout` seconds, while the job continues."""
-        end = None if timeout is None else time.monotonic() + timeout
+        return self._wait(timeout, None if timeout is None else time.monotonic() + timeout)
+
+    def _wait(self, timeout: Optional[float], end: Optional[float]) -> Job:
         while not self.is_finished:
             left = _WAIT if end is None else min(_WAIT, end - time.monotonic())
             if left <= 0:
@@ -597,6 +613,8 @@ class Job:
             plain = {"title": f"Job {self.id} is {self.status}", "type": f"/problems/{kind}", "status": 409}
             document = self.document.get("problem")
             raise Problem(document if isinstance(document, dict) and document else plain, job=self)
+        if not isinstance(self.document["result"], str):
+            raise UnexpectedAnswer(f"job {self.id} is successful and has no result")
         return (Study if self.document.get("study") else Result)(self._lab, self.document["result"], self.document)
 
     def cancel(self) -> Job:
@@ -1122,14 +1140,15 @@ class Lab:
 
     def _finish(self, scene: Mapping[str, Any], timeout: Optional[float], progress: Progress) -> Result:
         key, job = uuid.uuid4().hex, None
+        end = None if timeout is None else time.monotonic() + timeout
+        longest = min(self._http.timeout / 2, 2 if timeout is None else timeout)  # wait= takes whole seconds
         try:
-            job = self._post(scene, "wait=2", key)
+            job = self._post(scene, "wait=2" if longest >= 2 else "respond-async", key)
             shown = _Progress(progress, 100, "%")
-            end = None if timeout is None else time.monotonic() + timeout
             while not job.is_finished and progress and (end is None or time.monotonic() < end):
                 shown(int(job.progress))
                 job.refresh(0.5)
-            job.wait(None if end is None else max(end - time.monotonic(), 0))
+            job._wait(timeout, end)
             shown(100)
             return job.result()
         except KeyboardInterrupt:
