@@ -350,7 +350,10 @@ def test_mistakes_of_the_caller_are_named():
     with laboratory() as lab, tempfile.NamedTemporaryFile("w", suffix=".json") as file:
         for wrong in (5, None, b"x", ["paper_free_sponge"]):
             assert "a scene is a dict" in str(raised(TypeError, lab.run, wrong))
-        assert "empty string" in str(raised(ValueError, lab.run, ""))
+        assert "empty string" in str(raised(ValueError, lab.run, "")) and "is empty" in str(raised(ValueError, lab.job, ""))
+        for wrong in (0.01, "sponge"):
+            assert "are a list" in str(raised(TypeError, lab.sweep, "paper_free_sponge", {CLEARANCE: wrong}))
+        assert [r.summary["impacts"] for r in lab.gather("paper_free_sponge")] == [22]
         file.write("root:x:0")
         file.flush()
         assert file.name in str(raised(ValueError, lab.run, file.name))

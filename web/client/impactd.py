@@ -276,6 +276,8 @@ def _axis(path: Union[str, Sequence[str]], values: Any) -> dict[str, Any]:
         axis.update(values)
     elif isinstance(values, tuple) and len(values) in (2, 3):
         axis.update(zip(("from", "to", "count"), values))
+    elif isinstance(values, (str, int, float)):
+        raise TypeError(f"the values of {path!r} are a list, an array or a tuple (from, to, count), not {values!r}")
     else:
         axis["values"] = list(values) if not hasattr(values, "tolist") else values.tolist()
     return axis
@@ -502,6 +504,8 @@ def _query(path: str, **values: Any) -> str:
 
 
 def _name(text: str) -> str:
+    if text == "":
+        raise ValueError("an id or a name is empty")
     return urllib.parse.quote(str(text), safe="@")
 
 
@@ -1203,6 +1207,8 @@ class Lab:
             for r in lab.gather(jobs):
                 print(r.summary["rms_displacement"])
         """
+        if isinstance(jobs, (collections.abc.Mapping, str, os.PathLike, Result, Job)):
+            jobs = [jobs]
         jobs = [job if isinstance(job, Job) else self.submit(job) for job in jobs]
         shown, waiting, place = _Progress(progress, len(jobs), "jobs"), {}, 0
         try:
