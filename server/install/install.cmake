@@ -75,9 +75,10 @@ string(REPLACE "\n" "\n " licence "${licence}")
 string(REPLACE "\n \n" "\n .\n" licence "${licence}")
 file(WRITE ${PAGES}/deb/copyright "Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
 Upstream-Name: impactd
-Comment: The program is linked with FFTW, so it may be passed on under the terms of
- the GNU General Public License, version 2 or later, in
- /usr/share/common-licenses/GPL-2. It contains dragonbox (Copyright 2020-2021
+Comment: The program is linked with FFTW, which is under the GNU General Public
+ License, version 2 or later, and contains htm, which is under the Apache License
+ 2.0. Together they may be passed on under the terms of version 3, in
+ /usr/share/common-licenses/GPL-3. It contains dragonbox (Copyright 2020-2021
  Junekey Jeon, Boost Software License 1.0).
 
 Files: *
@@ -87,6 +88,20 @@ License: Expat
 Files: web/vendor/uplot/*
 Copyright: 2022 Leon Sorokin
 License: Expat
+
+Files: web/vendor/htm/*
+Copyright: 2018 Google Inc., 2015-present Jason Miller (Preact, which is part of it)
+License: Apache-2.0 and Expat
+
+Files: web/vendor/inter/*
+Copyright: 2016 The Inter Project Authors
+License: OFL-1.1
+ The whole text is in web/vendor/inter/LICENSE of the sources, and at
+ https://openfontlicense.org.
+
+License: Apache-2.0 and Expat
+ The Apache License 2.0 is in /usr/share/common-licenses/Apache-2.0; the
+ licence of Preact is the Expat licence below.
 
 License: Expat
  ${licence}")
