@@ -77,3 +77,33 @@ test("The theme is chosen by a button and stays; the link over the navigation le
   await page.keyboard.press("Enter");
   assert.equal(await page.evaluate(() => document.activeElement.id), "main");
 });
+
+test("Units are chosen in the header: charts, numbers and tables follow at once, and stay; the address does not change", async ({ page, daemon, url }) => {
+  const result = await sponge(daemon), main = page.getByRole("main");
+  const { summary } = await daemon.get(`/v1${result.hash.slice(1)}`);
+  await settle(page, url(`${result.hash}?channels=displacement,acceleration,contact_force`), result);
+  const hash = await page.evaluate(() => location.hash);
+  const heading = (name) => page.getByRole("heading", { name });
+  await heading("Displacement [mm]").waitFor();
+  await heading("Acceleration [m/s²]").waitFor();
+  await page.getByRole("button", { name: "Units" }).click();
+  const choose = (quantity, unit) => page.getByRole("group", { name: quantity }).getByRole("button", { name: unit, exact: true }).click();
+  await choose("Lengths", "m");
+  await choose("Accelerations", "g");
+  await choose("Forces", "kN");
+  await heading("Displacement [m]").waitFor();
+  await heading("Acceleration [g]").waitFor();
+  await heading("Contact force [kN]").waitFor();
+  await says(page.getByRole("region", { name: "Impacts", exact: true }), /Peak force \[kN\]/);
+  await says(main, new RegExp(`Acceleration, rms[^]*${(summary.rms_acceleration / 9.80665).toPrecision(3)}\\d* g`));
+  assert.equal(await page.evaluate(() => location.hash), hash);
+  await settle(page, () => page.reload(), result);
+  await heading("Acceleration [g]").waitFor();
+  const [first, second] = await page.getByRole("figure", { name: "Acceleration" }).locator("text").allTextContents();
+  assert.ok(Number.isInteger(Number(first.replace("−", "-")) * 100) && first !== second, `ticks are round in g: ${first}, ${second}`);
+  await page.goto(url("#/scene"));
+  await says(page.getByRole("region", { name: "Live" }), /Clearance\s+0\.015 m/);
+  await page.getByRole("button", { name: "Units" }).click();
+  await choose("Lengths", "Automatic");
+  await says(main, /= 15 mm/);
+});

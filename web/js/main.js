@@ -2,10 +2,14 @@
 import { read } from "./address.js";
 import { get, onUnauthorised, readUntil, session, setToken, token } from "./api.js";
 import { failure, fill, h, once, tell } from "./dom.js";
+import { settings } from "./settings.js";
 import { themed } from "./theme.js";
+import { html, render } from "./ui/preact.js";
+import { UnitsMenu } from "./ui/units_menu.js";
 
-// A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, leave()?}:
-// for a new query on the same path (false: show it anew), and for the end, when `signal` is aborted.
+// A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, redraw()?,
+// leave()?}: for a new query on the same path (false: show it anew), for other units (without it: show it anew), and for the end,
+// when `signal` is aborted.
 // "materials" is in materials_page.js, "materials/felt" in material_page.js, "materials/felt/measure" in measure_page.js.
 const pages = ["scene", "jobs", "job", "result", "compare", "materials", "material", "measure", "records", "record", "shell"];
 const views = { result: () => import("./result/page.js") };
@@ -20,15 +24,27 @@ async function show() {
     if (last !== shown) return; // another one has come meanwhile
     if (controller?.change && controller.change(read()) !== false) return;
   }
+  showAnew(last);
+}
+
+async function redraw() {
+  const last = shown, controller = await last.controller;
+  if (last !== shown) return;
+  if (controller?.redraw) controller.redraw();
+  else showAnew(last, true);
+}
+
+// With `isStill` the reader stays where the page and the focus are.
+function showAnew(last, isStill = false) {
   last?.stop.abort();
   last?.controller.then((controller) => controller?.leave?.());
   const address = read(), path = address.path.join("/"), stop = new AbortController();
-  shown = { path, stop, controller: open(address, path, stop.signal, last) };
+  shown = { path, stop, controller: open(address, path, stop.signal, last && !isStill) };
 }
 
-async function open(address, path, signal, last) {
+async function open(address, path, signal, isNext) {
   readUntil(signal);
-  if (last) fill(main, "Loading …"); // what is left takes no clicks
+  if (isNext) fill(main, "Loading …"); // what is left takes no clicks
   const [first = "scene", one, part] = address.path, name = part ?? (one ? first.slice(0, -1) : first);
   for (const anchor of document.querySelectorAll("#pages a"))
     anchor.ariaCurrent = anchor.hash === `#/${first === "results" ? "jobs" : first}` ? "page" : null;
@@ -39,7 +55,7 @@ async function open(address, path, signal, last) {
     const title = page.title(address), host = h("div.page", null, "Loading …");
     document.title = `${title} · impactd`;
     fill(main, host);
-    if (last) {
+    if (isNext) {
       scrollTo(0, 0);
       main.focus({ preventScroll: true });
       tell(title);
@@ -53,6 +69,8 @@ async function open(address, path, signal, last) {
 }
 
 themed(document.getElementById("theme"));
+render(html`<${UnitsMenu} />`, document.getElementById("units"));
+settings.subscribe(redraw);
 
 // The token, asked for where the service wants one, kept until the tab is closed.
 const askToken = once(() => new Promise((resolve) => {

@@ -2,7 +2,8 @@
 const KEY = "impactd.theme";
 
 export function themed(button) {
-  const root = document.documentElement, system = matchMedia("(prefers-color-scheme: dark)");
+  const root = document.documentElement,
+    system = matchMedia("(prefers-color-scheme: dark)");
   const isDark = () => (root.dataset.theme ? root.dataset.theme === "dark" : system.matches);
   function set(theme) {
     if (theme) root.dataset.theme = theme;

@@ -1,16 +1,17 @@
 // The frame of a chart: grid, ticks and their numbers, in the unit that suits the axis.
 import { html } from "../ui/preact.js";
-import { number, pretty, scale as unitScale } from "../units.js";
+import { chosenScale, number, pretty, scale as unitScale } from "../units.js";
 import { ticksOf } from "./scale.js";
 
 // {factor, unit, title} of an axis {label, unit}: numbers are divided by `factor` and shown in `unit`.
 export function axisUnit(axis, domain) {
   const size = Math.max(Math.abs(domain[0]), Math.abs(domain[1]));
+  const isChosen = chosenScale(axis.unit) !== null;
   let factor = 1;
   let unit = axis.unit === "1" ? "" : (axis.unit ?? "");
-  if (!axis.log && size > 0) {
+  if (size > 0 && (isChosen || !axis.log)) {
     [factor, unit] = unitScale(size, unit);
-    if (factor === 1 && (size < 0.01 || size >= 1e5)) {
+    if (!isChosen && factor === 1 && (size < 0.01 || size >= 1e5)) {
       const power = 3 * Math.floor(Math.log10(size) / 3);
       factor = 10 ** power;
       unit = `10^${power} ${unit}`.trim();
@@ -21,12 +22,15 @@ export function axisUnit(axis, domain) {
 
 const tickText = (value, factor, isLog) =>
   isLog
-    ? number(value, 2).replace(/^1 × /, "")
+    ? number(value / factor, 2).replace(/^1 × /, "")
     : number(Number((value / factor).toPrecision(9)), 9);
 
-// A category axis has `categories`: texts at 0, 1, 2, …
-function ticksFor(axis, scale, most) {
-  if (!axis.categories) return ticksOf(scale, most);
+// Round numbers in the axis' unit; a category axis has `categories`: texts at 0, 1, 2, …
+function ticksFor(axis, scale, factor, most) {
+  if (!axis.categories) {
+    const domain = scale.domain.map((end) => end / factor);
+    return ticksOf({ ...scale, domain }, most).map((value) => value * factor);
+  }
   const every = Math.max(1, Math.ceil(axis.categories.length / most));
   return axis.categories.map((_, index) => index).filter((index) => index % every === 0);
 }
@@ -34,7 +38,12 @@ function ticksFor(axis, scale, most) {
 export function XAxis({ axis, scale, top, bottom, isCompact }) {
   const [left, right] = scale.pixels;
   const { factor } = axisUnit(axis, scale.domain);
-  const ticks = ticksFor(axis, scale, Math.max(2, (right - left) / (axis.categories ? 90 : 80)));
+  const ticks = ticksFor(
+    axis,
+    scale,
+    factor,
+    Math.max(2, (right - left) / (axis.categories ? 90 : 80)),
+  );
   return html`<g class="axis">
     ${ticks.map((value) => {
       const x = Math.round(scale.to(value)) + 0.5;
@@ -51,7 +60,12 @@ export function XAxis({ axis, scale, top, bottom, isCompact }) {
 export function YAxis({ axis, scale, left, right }) {
   const [bottom, top] = scale.pixels;
   const { factor } = axisUnit(axis, scale.domain);
-  const ticks = ticksFor(axis, scale, Math.max(2, (bottom - top) / (axis.categories ? 18 : 34)));
+  const ticks = ticksFor(
+    axis,
+    scale,
+    factor,
+    Math.max(2, (bottom - top) / (axis.categories ? 18 : 34)),
+  );
   return html`<g class="axis">
     ${ticks.map((value) => {
       const y = Math.round(scale.to(value)) + 0.5;

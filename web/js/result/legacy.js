@@ -1,10 +1,13 @@
 // A part of the page that is built from elements: {show(host, context) -> controller}.
 import { html, useEffect, useRef } from "../ui/preact.js";
 import { failure, fill } from "../dom.js";
+import { settings } from "../settings.js";
+import { useStore } from "../ui/store.js";
 import { useResult } from "./context.js";
 
 export function Section({ section }) {
   const { classic, query } = useResult();
+  const units = useStore(settings);
   const box = useRef(null);
   const controller = useRef(null); // a promise of what show() returns
   const made = useRef(null);
@@ -19,7 +22,7 @@ export function Section({ section }) {
       controller.current.then((shown) => shown?.leave?.());
       host.remove();
     };
-  }, [section]);
+  }, [section, units]);
   // At once where a part of the page changes the address, later where the browser does ("back").
   const key = JSON.stringify(query);
   const last = useRef(key);

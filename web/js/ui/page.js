@@ -1,12 +1,20 @@
-// A page whose view is a component: View({address, signal}) is drawn again when the query of its address changes.
+// A page whose view is a component: View({address, signal}) is drawn again when the query of its address or the units change.
 import { html, render } from "./preact.js";
 
 export const pageOf = (title, View) => ({
   title,
   show(host, address, signal) {
-    const draw = (next) => render(html`<${View} address=${next} signal=${signal} />`, host);
+    let current = address;
+    const redraw = () => render(html`<${View} address=${current} signal=${signal} />`, host);
     host.replaceChildren();
-    draw(address);
-    return { change: draw, leave: () => render(null, host) };
+    redraw();
+    return {
+      change(next) {
+        current = next;
+        redraw();
+      },
+      redraw,
+      leave: () => render(null, host),
+    };
   },
 });

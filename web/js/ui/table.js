@@ -1,6 +1,8 @@
 // Tables of results: one unit for a column, decimals aligned, sorted by a click on a heading, filtered by words, copied.
 import { html, useMemo, useState } from "./preact.js";
+import { settings } from "../settings.js";
 import { CopyButton } from "./controls.js";
+import { useStore } from "./store.js";
 import { number, pretty, scale } from "../units.js";
 
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
@@ -47,6 +49,7 @@ export function Table({
 }) {
   const [order, setOrder] = useState({ column: -1, direction: 1 });
   const [words, setWords] = useState("");
+  const units = useStore(settings);
   const formats = useMemo(
     () =>
       columns.map((column) =>
@@ -54,7 +57,7 @@ export function Table({
           ? columnFormat(rows.map(column.value), column.unit, column.digits)
           : null,
       ),
-    [columns, rows],
+    [columns, rows, units],
   );
   const textOf = (column, row, at) => {
     const value = column.value(row);
