@@ -1,4 +1,5 @@
-// Materials as a lab member uses them: found, measured by a drop test, reviewed, reverted, written by two at once.
+// Materials as a lab member uses them: found, computed for a pair of masses, measured by a drop test, reviewed, reverted, written
+// by two at once.
 import assert from "node:assert/strict";
 import fs from "node:fs";
 import path from "node:path";
@@ -40,13 +41,13 @@ test("A drop test of a new material is entered by keyboard alone, and simulated 
   await leads(page, /#\/materials\/cork_3_mm\/measure/);
   const first = page.getByLabel("Drop height, drop 1");
   await until("the first cell to have the focus", () => first.evaluate((node) => node === document.activeElement));
-  await type(".1");
+  await type("100");
   await press("Tab");
-  await type(".04");
+  await type("40");
   await press("Tab", "Tab", "Tab");
-  await type(".009");
+  await type("9");
   await press("Shift+Tab", "Shift+Tab", "Shift+Tab", "Enter");
-  for (const height of [".041", ".039", ".042", ".04"]) {
+  for (const height of ["41", "39", "42", "40"]) {
     await type(height);
     await press("Enter");
   }
@@ -69,15 +70,15 @@ test("A drop test of a new material is entered by keyboard alone, and simulated 
 test("Faults of a drop test stand in their rows, and a column is pasted", async ({ page, url, refused }) => {
   refused(422);
   await page.goto(url("#/materials/sponge/measure"));
-  await page.getByLabel("Drop height, drop 1").fill("0.1");
-  await page.getByLabel("Rebound height, drop 1").fill("0,5");
+  await page.getByLabel("Drop height, drop 1").fill("100");
+  await page.getByLabel("Rebound height, drop 1").fill("0,5 x");
   const cell = page.getByLabel("Rebound height, drop 1");
   await until("the fault", async () => (await cell.getAttribute("aria-invalid")) === "true");
   await page.getByRole("button", { name: "Drop 1, rebound height" }).click();
   await until("the focus to be there", () => cell.evaluate((node) => node === document.activeElement));
   await cell.evaluate((node) => {
     const clipboardData = new DataTransfer();
-    clipboardData.setData("text", "height\n0.037\n0.038\n0,036\n0.09\n");
+    clipboardData.setData("text", "height [cm]\n3.7\n3.8\n3,6\n9\n");
     node.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
   });
   await says(page.getByRole("definition"), /readings: 4/);
@@ -106,13 +107,14 @@ async function choose(page, folder, name, text) {
 // The values of a column of a chart's table.
 async function column(page, chart, name) {
   const figure = page.getByRole("figure", { name: chart });
-  await figure.getByText("As a table").click();
+  const numbers = figure.getByRole("button", { name: /^Numbers/ });
+  await numbers.click();
   await figure.getByRole("table").waitFor();
   const found = await figure.getByRole("table").evaluate((table, name) => {
     const at = [...table.querySelectorAll("thead th")].findIndex((head) => head.textContent.includes(name));
     return [...table.querySelectorAll("tbody tr")].map((row) => row.children[at]?.textContent);
   }, name);
-  await figure.getByText("As a table").click();
+  await numbers.click();
   return found;
 }
 
@@ -159,7 +161,7 @@ test("A revision is reviewed, compared and reverted; who writes second is told w
   await page.getByLabel("Reason").fill("agrees with the sheet");
   await page.getByRole("button", { name: "Review it" }).click();
   await says(main(page), /Felt approved/);
-  await says(page.getByRole("region", { name: "Trail" }), /Approved revision 2: agrees with the sheet .*Wrote revision 2: measured anew/s);
+  await says(page.getByRole("region", { name: "History" }), /Approved revision 2: agrees with the sheet\s.*Wrote revision 2: measured anew/s);
   await page.getByRole("link", { name: "Revision 1", exact: true }).click();
   await says(main(page), /felt@1 of 2/); // the page before has the same differences
   await says(page.getByRole("region", { name: "From revision 1 to revision 2" }), /Restitution\s+0\.3\s+0\.33/);
@@ -167,7 +169,7 @@ test("A revision is reviewed, compared and reverted; who writes second is told w
   await daemon.ask("POST", "/v1/materials/felt/revisions", { ...felt, restitution: 0.35, comment: "a third sheet" }, { "If-Match": "*" });
   await page.getByRole("button", { name: "Revert to revision 1" }).click();
   await says(main(page), /Another client changed it meanwhile.*a third sheet.*0\.33\s+0\.35/s);
-  await page.getByRole("button", { name: "Do mine all the same" }).click();
+  await page.getByRole("button", { name: "Make my change all the same" }).click();
   await says(main(page), /felt@4 of 4/);
   assert.equal((await daemon.get("/v1/materials/felt@4")).restitution, 0.3);
 });
@@ -175,7 +177,7 @@ test("A revision is reviewed, compared and reverted; who writes second is told w
 test("Materials are found by filters that stand in the URL", async ({ page, url, newPage }) => {
   await page.goto(url("#/materials"));
   await page.getByLabel("Words").fill("rubber");
-  await page.getByLabel("Restitution e").fill("0.5..");
+  await page.getByRole("textbox", { name: "Restitution e" }).fill("0.5..");
   await page.keyboard.press("Enter");
   await says(page.getByRole("main").getByRole("status"), /^1 found$/);
   const other = await newPage();
@@ -196,4 +198,71 @@ test("A table of materials has its faults told by row and column, and comes in w
   fs.writeFileSync(mended, "slug,name,restitution,source\nlab_one,One,0.3,own\n");
   await page.getByLabel(/^A table/).setInputFiles(mended);
   await says(page.getByRole("region", { name: "Materials" }), /One/);
+});
+
+test("A material's page computes k_b and c_b for a pair of masses, with uncertainty, and says where they hold", async ({ page, url, daemon, newPage }) => {
+  const cork = { name: "Cork", restitution: 0.5, restitution_deviation: 0.02, contact_time: 0.01, contact_time_deviation: 0.0005, source: "notebook 8",
+    impactor_mass: 0.11, base: "fixed", least_speed: 0.2, most_speed: 1.4 };
+  await daemon.ask("POST", "/v1/materials", { slug: "cork", ...cork });
+  await page.goto(url("#/materials/cork"));
+  const pair = page.getByRole("region", { name: "For a pair of masses" }), table = pair.getByRole("region", { name: /^Contact parameters/ });
+  assert.equal(await pair.getByLabel("Free mass").inputValue(), "0.11");
+  await says(pair, /Effective mass 0\.11 kg; that of the test 0\.11 kg; measured from 0\.2 to 1\.4 m\/s/);
+  await pair.getByLabel("Free mass").fill("0,5");
+  await pair.getByLabel("Mass that it meets").fill("20");
+  await says(pair, /Effective mass 0\.4878 kg/);
+  const { contacts: [{ stiffness, damping }] } = await daemon.get("/v1/materials/cork/derived?damper_mass=0.5&structure_mass=20");
+  const row = await table.getByRole("row", { name: /^zero penetration/ }).innerText();
+  assert.ok(row.includes((stiffness.value / 1000).toFixed(2)) && row.includes(damping.value.toFixed(2)), row);
+  await says(table, /k\s*b \[kN\/m\].*±.*95 %/s);
+  await pair.getByRole("figure", { name: /^Force of an impact at 0\.53 m\/s/ }).waitFor();
+  const other = await newPage({ viewport: { width: 390, height: 844 } });
+  await other.goto(page.url());
+  await says(other.getByRole("region", { name: "For a pair of masses" }), /Effective mass 0\.4878 kg/);
+  await pair.getByRole("button", { name: "kb and cb" }).click();
+  await leads(page, /for=rig/);
+  await pair.getByLabel("Mass that it meets").fill("-1");
+  await says(pair, /A mass is a number above 0 kg/);
+});
+
+test("Readings of drop tests are charts over the approach speed: what counts, what is far off, what is excluded", async ({ page, url, daemon }) => {
+  const drops = [[0.1, 0.0082], [0.1, 0.0088], [0.2, 0.017], [0.2, 0.0185], [0.3, 0.026], [0.3, 0.06]]
+    .map(([drop_height, rebound_height], at) => ({ drop_height, rebound_height, contact_time: 0.02 - at * 1e-4 }));
+  await daemon.ask("POST", "/v1/materials", { slug: "wool", name: "Wool", restitution: 0.3, source: "a guess" });
+  await daemon.ask("POST", "/v1/materials/wool/measurements", { drops: [...drops, { drop_height: 0.4, rebound_height: 0.033, excluded: "slipped" }], height_uncertainty: 0.001 });
+  await page.goto(url("#/materials/wool"));
+  const panel = page.getByRole("region", { name: "Drop tests", exact: true });
+  await says(panel, /Restitution e\s+0\.\d+.*95 %.*readings: 6, far off: 1/s);
+  const filled = (texts) => texts.filter((text) => text !== "–").length;
+  assert.equal(filled(await column(page, "Restitution e", "readings")), 3, "speeds of readings that count");
+  assert.equal(filled(await column(page, "Restitution e", "far off")), 1);
+  assert.equal(filled(await column(page, "Restitution e", "excluded")), 1);
+  await panel.getByRole("figure", { name: "Contact time T_c" }).getByRole("heading", { name: "[ms] over approach speed [m/s]" }).waitFor();
+});
+
+test("Heights are typed in mm and times in ms; with lengths in m what was typed is converted", async ({ page, url }) => {
+  await page.goto(url("#/materials/sponge/measure"));
+  const grid = page.getByRole("table", { name: "Drops" });
+  await says(grid, /Drop height\s+\[mm\].*Rebound height\s+\[mm\].*Contact time\s+\[ms\]/s);
+  await page.getByLabel("Drop height, drop 1").fill("150");
+  await page.getByLabel("Rebound height, drop 1").fill("54");
+  await page.getByLabel("Contact time, drop 1").fill("25");
+  const result = page.getByRole("region", { name: "Result" });
+  await says(result, /0\.6\s+[^]*25 ms/);
+  await page.getByRole("button", { name: "Units" }).click();
+  await page.getByRole("group", { name: "Lengths" }).getByRole("button", { name: "m", exact: true }).click();
+  await says(grid, /Drop height\s+\[m\]/);
+  assert.equal(await page.getByLabel("Drop height, drop 1").inputValue(), "0.15");
+  await page.keyboard.press("Escape");
+  await page.getByLabel("Rebound height, drop 2").fill("0.054");
+  await says(result, /0\.6\s+[^]*readings: 2/);
+});
+
+test("All materials are points of e over contact time; a click opens one", async ({ page, url }) => {
+  await page.goto(url("#/materials"));
+  const chart = page.getByRole("figure", { name: "Restitution e over contact time" });
+  await says(page.getByRole("region", { name: "Materials" }), /Aluminium\s+metal\s+0\.46\d*\s[^]*?\s0\.3\s[^]*Sponge\s+foam\s+0\.61\d*\s[^]*?\s25\.0\s/); // one unit for a column, decimals aligned
+  const place = await chart.locator("text", { hasText: /^Aluminium$/ }).boundingBox();
+  await page.mouse.click(place.x - 8, place.y + place.height / 2);
+  await leads(page, /#\/materials\/aluminium$/);
 });

@@ -59,8 +59,29 @@ test("A record of 500,000 samples is seen and zoomed into with less than 200 kB 
     await page.getByRole("link", { name: "long", exact: true }).click();
     await says(page.locator("main"), /the largest is 9 m\/s², at 123\.5 s/);
   });
-  const next = await transferred(page, () => page.getByRole("button", { name: "Zoom in" }).click());
+  const next = await transferred(page, async () => {
+    await page.getByRole("application", { name: /^Base acceleration/ }).focus();
+    await page.keyboard.press("+");
+  });
   assert.ok(first.bytes < 200000 && next.bytes > 1000 && next.bytes < 200000, `${first.bytes}, ${next.bytes}`);
   await leads(page, /from=/);
   assert.equal(await overflow(page), 0);
+});
+
+test("A record shows the response spectrum of oscillators; damping and quantity stand in the address", async ({ page, daemon, url }) => {
+  const samples = Array.from({ length: 1000 }, (_, k) => Math.sin((2 * Math.PI * k) / 50));
+  await daemon.ask("POST", "v1/records", { name: "hum", interval: 0.01, samples });
+  await page.goto(url("#/records/hum"));
+  await says(page.getByRole("definition").filter({ hasText: "made with it" }), /^0/);
+  const panel = page.getByRole("region", { name: "Response spectrum" });
+  await panel.getByRole("figure", { name: "Pseudo-acceleration of oscillators" }).waitFor();
+  await panel.getByRole("button", { name: "Displacement" }).click();
+  await panel.getByRole("group", { name: "Damping ratio" }).getByRole("button", { name: "2 %" }).click();
+  await leads(page, /spectrum=displacement&damping=0\.02/);
+  await page.reload();
+  await panel.getByRole("figure", { name: "Displacement of oscillators" }).waitFor();
+  assert.equal(await panel.getByRole("button", { name: "2 %" }).getAttribute("aria-pressed"), "true");
+  await page.getByRole("button", { name: "Download" }).click();
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Samples as csv" }).click()]);
+  assert.equal(download.suggestedFilename(), "hum.csv");
 });

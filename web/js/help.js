@@ -24,4 +24,9 @@ export const places = {
   "Review and change": "materials#revisions",
   "What was read": "drop-tests#what-to-measure",
   "Upload one": "ground-motions#files",
+  Derived: "materials#which-masses-e-and-t_c-belong-to",
+  Revisions: "materials#revisions",
+  "Response spectrum": "ground-motions#response-spectra",
+  Proposal: "drop-tests#make-a-revision-of-it",
+  "Add and exchange": "materials#share-and-exchange",
 };

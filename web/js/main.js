@@ -10,9 +10,13 @@ import { UnitsMenu } from "./ui/units_menu.js";
 // A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, redraw()?,
 // leave()?}: for a new query on the same path (false: show it anew), for other units (without it: show it anew), and for the end,
 // when `signal` is aborted.
-// "materials" is in materials_page.js, "materials/felt" in material_page.js, "materials/felt/measure" in measure_page.js.
+// "materials/felt" is the page "material", "materials/felt/measure" the page "measure".
 const pages = ["scene", "jobs", "job", "result", "compare", "materials", "material", "measure", "records", "record", "shell"];
-const views = { result: () => import("./result/page.js") };
+const views = {
+  result: () => import("./result/page.js"), materials: () => import("./library/materials.js"),
+  material: () => import("./library/material.js"), measure: () => import("./library/drop_test.js"),
+  records: () => import("./library/records.js"), record: () => import("./library/record.js"),
+};
 
 const [main, tokenButton, skip, version] = ["main", "token", "skip", "version"].map((id) => document.getElementById(id));
 let shown = null; // {path, stop, controller: promise}

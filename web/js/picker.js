@@ -3,7 +3,7 @@ import { get } from "./api.js";
 import { faults, fill, folded, h } from "./dom.js";
 import { choice } from "./fields.js";
 import { form } from "./form.js";
-import { figure, path, range } from "./material_parts.js";
+import { figure, path, range } from "./library/format.js";
 import { quantity } from "./units.js";
 
 // Numbers of one's own, and what they begin with: the stop as it is now.

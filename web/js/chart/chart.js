@@ -1,6 +1,7 @@
 // One chart: series over one axis, with marks of events, shaded spans, rules, zoom, a cursor with a tooltip, a legend that
 // hides and isolates, its picture and its numbers to take along. Everything is SVG: the page's style colours it.
 import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { withSubscripts } from "../ui/controls.js";
 import { announce } from "../ui/announce.js";
 import { freshId } from "../ui/ids.js";
 import { quantity } from "../units.js";
@@ -124,7 +125,7 @@ export function Chart(props) {
   const summary = description ?? describe(props.series, x, y, domain);
   return html`<figure class="chart" aria-label=${title}>
     <div class="chart-head">
-      <h3>${heading}</h3>
+      <h3>${withSubscripts(heading)}</h3>
       ${
         props.series.length > 1 &&
         html`<${Legend} series=${props.series} hidden=${hidden} setHidden=${setHidden} />`

@@ -26,7 +26,7 @@ export function valuesAt(series, x, y) {
     const index = nearestIndex(one, x);
     if (index < 0) return [];
     const unit = one.unit ?? y.unit;
-    if (one.kind === "band") {
+    if (one.low) {
       const text = `${quantity(one.low[index], unit)} to ${quantity(one.high[index], unit)}`;
       return isValue(one.high[index])
         ? [{ series: one, index, text, x: one.x[index], y: null }]

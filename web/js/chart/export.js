@@ -88,7 +88,7 @@ export function ChartTools({
 function rowsOf(series) {
   const rows = new Map();
   series.forEach((one, column) => {
-    const values = one.kind === "band" ? one.high : one.y;
+    const values = one.low ? one.high : one.y;
     for (let index = 0; index < one.x.length && rows.size < 20 * MOST_ROWS; index++) {
       const x = one.x[index];
       if (!rows.has(x)) rows.set(x, []);

@@ -98,6 +98,15 @@ export function pointsPath(xs, ys, xScale, yScale) {
   return parts.join("");
 }
 
+// Upright lines from each low to each high, with ends.
+export function errorsPath(xs, lows, highs, xScale, yScale) {
+  return Array.from(xs, (place, index) => {
+    const x = round(xScale.to(place));
+    const [low, high] = [lows[index], highs[index]].map((value) => round(yScale.to(value)));
+    return `M${x - 3} ${low}h6m-3 0V${high}m-3 0h6`;
+  }).join("");
+}
+
 // Bars from the axis' zero, or from its lower end, to each value; `widths` in units of x.
 export function barsPath(xs, ys, widths, xScale, yScale) {
   const parts = [];

@@ -1,6 +1,14 @@
-// What a chart draws, by kind: {kind: "line", "band", "points" or "bars", label, color, x, y, low, high, width, dash}.
+// What a chart draws, by kind: {kind: "line", "band", "points", "errors" or "bars", label, color, x, y, low, high, width, dash}.
 import { html } from "../ui/preact.js";
-import { bandPath, barsPath, indexAtLeast, isSorted, linePath, pointsPath } from "./path.js";
+import {
+  bandPath,
+  barsPath,
+  errorsPath,
+  indexAtLeast,
+  isSorted,
+  linePath,
+  pointsPath,
+} from "./path.js";
 
 // A colour is the name of a variable of style.css.
 const ink = (series) => ({ "--ink": `var(--${series.color ?? "accent"})` });
@@ -25,6 +33,12 @@ const drawings = {
       style=${{ ...ink(series), strokeWidth: series.size ?? null }}
       d=${pointsPath(series.x, series.y, x, y)}
     />`,
+  errors: (series, x, y) =>
+    html`<path
+      class="errors"
+      style=${ink(series)}
+      d=${errorsPath(series.x, series.low, series.high, x, y)}
+    />`,
   bars: (series, x, y) =>
     html`<path
       class="bars"
@@ -38,7 +52,7 @@ export const drawSeries = (series, x, y, density) =>
 
 // The values that the vertical axis has to hold, of the samples in view.
 export function valuesInView(series, domain) {
-  const columns = series.kind === "band" ? [series.low, series.high] : [series.y];
+  const columns = series.low ? [series.low, series.high] : [series.y];
   if (!isSorted(series.x)) return columns;
   const from = Math.max(0, indexAtLeast(series.x, domain[0]) - 1);
   const to = Math.min(series.x.length, indexAtLeast(series.x, domain[1]) + 1);

@@ -164,7 +164,7 @@ export const Choice = ({ label, options, value, onChange }) =>
           aria-pressed=${option.value === value}
           onClick=${() => onChange(option.value)}
         >
-          ${option.label}
+          ${withSubscripts(option.label)}
         </button>`,
     )}
   </div>`;
@@ -195,13 +195,22 @@ export function Menu({ label, children }) {
   </div>`;
 }
 
+// "T_c" as T with the index c.
+export const withSubscripts = (text) =>
+  text
+    .split(/\b([A-Za-z])_([a-z])\b/)
+    .map((part, at) => (at % 3 === 2 ? html`<sub>${part}</sub>` : part));
+
 // Headline numbers: [{label, value, note, tone, help}].
 export const Headlines = ({ items }) =>
   html`<dl class="headlines">
     ${items.map(
       ({ label, value, note, tone, hint, place }) =>
         html`<div class=${tone}>
-          <dt>${label} ${place && html`<${Help} name=${label} place=${place} hint=${hint} />`}</dt>
+          <dt>
+            <span>${withSubscripts(label)}</span>
+            ${place && html`<${Help} name=${label} place=${place} hint=${hint} />`}
+          </dt>
           <dd>${value}${note && html`<small>${note}</small>`}</dd>
         </div>`,
     )}

@@ -1,7 +1,7 @@
 // Tables of results: one unit for a column, decimals aligned, sorted by a click on a heading, filtered by words, copied.
 import { html, useMemo, useState } from "./preact.js";
 import { settings } from "../settings.js";
-import { CopyButton } from "./controls.js";
+import { CopyButton, withSubscripts } from "./controls.js";
 import { useStore } from "./store.js";
 import { number, pretty, scale } from "../units.js";
 
@@ -17,10 +17,13 @@ export function columnFormat(values, unit, digits = 4) {
   const isPlain = size === 0 || (size >= 1e-3 && size < 1e6);
   const decimals =
     isWhole || size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
+  let places = Math.min(decimals, 9);
+  const isRound = (value) => !isNumber(value) || (value / factor).toFixed(places).endsWith("0");
+  while (places > 0 && values.every(isRound)) places--;
   const write = (value) => {
     if (!isNumber(value)) return number(value, digits);
     return isPlain
-      ? (value / factor).toFixed(Math.min(decimals, 9)).replace("-", "−")
+      ? (value / factor).toFixed(places).replace("-", "−")
       : number(value / factor, digits);
   };
   return { factor, unit: shown === "1" ? "" : pretty(shown), write };
@@ -34,7 +37,7 @@ function compare(a, b) {
 }
 
 // A table of `rows`. A column is {label, value(row), unit, digits, cell(row), isNumeric}: `value` is what is sorted and
-// copied; numbers are written in the column's unit, or as `cell` shows them. `filter` shows a field whose words rows must
+// copied; numbers are written in the column's unit, or as `cell` shows them where it returns something. `filter` shows a field whose words rows must
 // contain; `selection` is {chosen: Set of keys, toggle(row)}, with `keyOf(row)`; `chosenKey` marks a row.
 export function Table({
   caption,
@@ -113,7 +116,7 @@ export function Table({
                   aria-sort=${ariaSort(at)}
                 >
                   <button type="button" class="sort" onClick=${() => sort(at)}>
-                    ${headOf(column, at)}
+                    ${withSubscripts(headOf(column, at))}
                   </button>
                 </th>`,
             )}
@@ -139,7 +142,7 @@ export function Table({
                   </td>`
                 }
                 ${columns.map((column, at) => {
-                  const content = column.cell ? column.cell(row) : textOf(column, row, at);
+                  const content = column.cell?.(row) ?? textOf(column, row, at);
                   const kind = formats[at] ? "number" : null;
                   return at === 0
                     ? html`<th scope="row" class=${kind}>${content}</th>`

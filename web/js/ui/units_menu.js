@@ -8,7 +8,7 @@ import { useStore } from "./store.js";
 export function UnitsMenu() {
   const chosen = useStore(settings);
   return html`<button type="button" class="quiet" popovertarget="units-menu">Units</button>
-    <div id="units-menu" popover="auto" role="group" aria-label="Units">
+    <div id="units-menu" popover="auto" role="group" aria-label="How numbers are written">
       ${unitSettings.map(
         ({ name, label, choices }) =>
           html`<div class="setting">

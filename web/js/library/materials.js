@@ -1,0 +1,178 @@
+// All materials: searched by words and ranges, seen as e over contact time, added, imported and exported.
+import { go, link } from "../address.js";
+import { get, post, save } from "../api.js";
+import { Chart } from "../chart/chart.js";
+import { Button, Failure, Help, Loaded, Panel } from "../ui/controls.js";
+import { pageOf } from "../ui/page.js";
+import { html, useState } from "../ui/preact.js";
+import { useLoaded } from "../ui/store.js";
+import { Table } from "../ui/table.js";
+import { figureColumns, range, statusColumn } from "./format.js";
+import { NamedForm } from "./schema_form.js";
+
+const LIMIT = 1000;
+const MAX_NAMES = 25; // written into the chart
+const FILTERS = [
+  { name: "q", label: "Words", example: "" },
+  { name: "kind", label: "Kind", example: "rubber" },
+  { name: "e", label: "Restitution e", example: "0.4..0.7" },
+  { name: "T_c", label: "Contact time [s]", example: "..0.02" },
+  { name: "status", label: "Status", example: "draft" },
+];
+const COLORS = { approved: "ok", draft: "c2", deprecated: "bad" };
+
+function Search({ query }) {
+  const submit = (event) => {
+    event.preventDefault();
+    go("materials", Object.fromEntries(new FormData(event.currentTarget)));
+  };
+  return html`<form class="row level" role="search" onSubmit=${submit}>
+    ${FILTERS.map(
+      ({ name, label, example }) =>
+        html`<label class="filter"
+          >${label}
+          <input name=${name} placeholder=${example} size="12" defaultValue=${query[name] ?? ""}
+        /></label>`,
+    )}
+    <button>Search</button>
+  </form>`;
+}
+
+// Where materials lie between hard and soft, lively and dull; a click opens one.
+function Overview({ materials }) {
+  const rows = materials.filter((row) => row.restitution !== null && row.contact_time !== null);
+  if (rows.length < 2) return null;
+  const isNamed = rows.length <= MAX_NAMES;
+  const statuses = Object.keys(COLORS).filter((status) =>
+    rows.some((row) => row.status === status),
+  );
+  const of = (status) => rows.filter((row) => row.status === status);
+  const series = statuses.map((status) => ({
+    kind: "points",
+    label: status,
+    color: COLORS[status],
+    size: 10,
+    x: of(status).map((row) => 1000 * row.contact_time),
+    y: of(status).map((row) => row.restitution),
+  }));
+  const open = (shown, index) => go(`materials/${of(shown.label)[index].slug}`);
+  const names = ({ x, y, right }) =>
+    rows.map((row) => {
+      const at = x.to(1000 * row.contact_time);
+      const isLate = at > right - 90;
+      return html`<text
+        x=${isLate ? at - 9 : at + 9}
+        y=${y.to(row.restitution) + 4}
+        text-anchor=${isLate ? "end" : "start"}
+        >${row.name}</text
+      >`;
+    });
+  return html`<${Chart}
+    title="Restitution e over contact time"
+    height=${190}
+    isShort
+    x=${{ label: "Contact time T_c", unit: "ms", log: true }}
+    y=${{ label: "Restitution e", unit: "1" }}
+    series=${series}
+    onPick=${open}
+  >
+    ${isNamed && names}
+  <//>`;
+}
+
+const columnsOf = (materials) => [
+  {
+    label: "Material",
+    value: (row) => row.name,
+    cell: (row) => html`<a href=${link(`materials/${row.slug}`)}>${row.name}</a>`,
+  },
+  { label: "Kind", value: (row) => row.kind },
+  ...figureColumns(materials),
+  {
+    label: "Speeds",
+    unit: "m/s",
+    value: (row) => row.most_speed,
+    cell: (row) =>
+      row.most_speed === null ? "–" : range(row.least_speed, row.most_speed, "").trim(),
+  },
+  { label: "Source", value: (row) => row.source },
+  statusColumn,
+];
+
+function Found({ materials }) {
+  const more = materials.length === LIMIT ? ", perhaps more: narrow the search" : "";
+  return html`<p class="quiet" role="status">${`${materials.length} found${more}`}</p>
+    <${Overview} materials=${materials} />
+    <${Table}
+      caption="Materials"
+      columns=${columnsOf(materials)}
+      rows=${materials}
+      keyOf=${(row) => row.slug}
+      empty="No material is like that."
+    />`;
+}
+
+// A file is imported whole or, with a fault, not at all.
+function Import({ onDone }) {
+  const [error, setError] = useState(null);
+  const read = async (event) => {
+    const [body] = event.currentTarget.files;
+    if (!body) return;
+    const type = body.name.endsWith(".json") ? "application/json" : "text/csv";
+    setError(null);
+    try {
+      await post("v1/materials/import", undefined, { body, type });
+      onDone();
+    } catch (problem) {
+      if (problem.name !== "AbortError") setError(problem);
+    }
+  };
+  const forget = (event) => (event.currentTarget.value = ""); // the same file may come again
+  return html`<label
+      >A table (CSV) with slug, name, restitution and source, or an export (JSON)
+      <input type="file" accept=".csv,.json" onClick=${forget} onChange=${read} />
+    </label>
+    ${error && html`<${Failure} error=${error} />`}`;
+}
+
+function AddForm() {
+  const add = async (value) => go(`materials/${(await post("v1/materials", value)).slug}`);
+  return html`<p class="hint">e may be a guess, if its source says so.</p>
+    <${NamedForm} name="new_material" value=${{}} label="Add it" send=${add} />`;
+}
+
+function MaterialsPage({ address: { query } }) {
+  const [isAdding, setIsAdding] = useState(false);
+  const [isImporting, setIsImporting] = useState(false);
+  const [imports, setImports] = useState(0);
+  const loaded = useLoaded(
+    (signal) => get("v1/materials", { ...query, limit: LIMIT }, signal),
+    [JSON.stringify(query)],
+    imports,
+  );
+  const files = ["materials.csv", "materials.json"];
+  return html`<div class="title-row">
+      <h1>Materials</h1>
+      <${Help} name="Materials" />
+    </div>
+    <p class="lead">What a laboratory measured of its buffers.</p>
+    <section class="panel" aria-label="Search">
+      <${Search} key=${JSON.stringify(query)} query=${query} />
+      <${Loaded} loaded=${loaded}>${(data) => html`<${Found} ...${data} />`}<//>
+    </section>
+    <${Panel} title="Add and exchange">
+      <details onToggle=${(event) => setIsAdding(event.currentTarget.open)}>
+        <summary>Add a material</summary>
+        ${isAdding && html`<${AddForm} />`}
+      </details>
+      <details onToggle=${(event) => setIsImporting(event.currentTarget.open)}>
+        <summary>Import</summary>
+        ${isImporting && html`<${Import} onDone=${() => setImports((count) => count + 1)} />`}
+      </details>
+      <div class="row">
+        ${files.map((name) => html`<${Button} onClick=${() => save(`v1/${name}`, name)}>${`Export ${name}`}<//>`)}
+      </div>
+    <//>`;
+}
+
+export const page = pageOf(() => "Materials", MaterialsPage);

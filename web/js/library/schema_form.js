@@ -1,0 +1,130 @@
+// Forms by a schema that are sent as a whole, and those that change a material.
+import { swap } from "../address.js";
+import { post, schema as schemaNamed } from "../api.js";
+import { makeDraft } from "../draft.js";
+import { focusField, form } from "../form.js";
+import { place } from "../scene_form.js";
+import { Failure, faultText, Loaded, Notice } from "../ui/controls.js";
+import { html, render, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { useLoaded } from "../ui/store.js";
+import { title } from "../units.js";
+import { Differences, path, readMaterial } from "./format.js";
+
+// A component as a widget of a form: drawn again when the draft changes, until the draft's page is left.
+export const widgetOf = (Component) =>
+  function widget({ pointer, schema, label, draft }) {
+    const element = document.createElement("div");
+    const refresh = () =>
+      render(
+        html`<${Component} pointer=${pointer} schema=${schema} label=${label} draft=${draft} />`,
+        element,
+      );
+    draft.signal?.addEventListener("abort", () => render(null, element));
+    return { element, refresh };
+  };
+
+// The fields of a schema over a draft; `onReady(element)` is called once they are there.
+export function Fields({ schema, draft, onReady, ...options }) {
+  const box = useRef(null);
+  useEffect(() => {
+    const { leave } = form(box.current, {
+      schema,
+      draft,
+      shows: (pointer) => /^.(restitution|contact_time|comment)$/.test(pointer),
+      ...options,
+    });
+    onReady?.(box.current);
+    return leave;
+  }, [schema, draft]);
+  return html`<div ref=${box}></div>`;
+}
+
+// The faults of a refusal, each with a button to its field.
+export function Refusal({ error, onGo }) {
+  const { title: heading, errors = [] } = error;
+  if (!errors.some(({ pointer }) => pointer)) return html`<${Failure} error=${error} />`;
+  return html`<div class="notice bad" role="alert">
+    <strong>${heading}</strong>
+    <ul>
+      ${errors.map(
+        (fault) =>
+          html`<li>
+            <button type="button" class="quiet" onClick=${() => onGo(fault.pointer)}>
+              ${title(place(fault.pointer || "/form"))}</button
+            >${` ${faultText(fault)}`}
+          </li>`,
+      )}
+    </ul>
+  </div>`;
+}
+
+// Marks the faults of a refusal at their fields.
+export function markFaults(draft, error) {
+  draft.say(null, error.errors ?? []);
+}
+
+const focusFault = (box) =>
+  requestAnimationFrame(() => box.querySelector("[aria-invalid=true]")?.focus());
+
+// A form by a schema: send(value) when it is submitted; what it rejects with is shown, as is what it returns (a view).
+// `isFocused` gives the button the focus. Further options are form()'s.
+export function SchemaForm({ schema, value, label, send, isFocused, signal, ...options }) {
+  const draft = useMemo(() => makeDraft(structuredClone(value), signal), []);
+  const box = useRef(null);
+  const isSending = useRef(false);
+  const [outcome, setOutcome] = useState(null);
+  const goTo = (pointer) => focusField(box.current, pointer);
+  const submit = async (event) => {
+    event.preventDefault();
+    if (isSending.current) return;
+    isSending.current = true;
+    setOutcome("Wait …");
+    try {
+      setOutcome((await send(draft.scene)) ?? null);
+    } catch (error) {
+      if (error.name === "AbortError") return;
+      markFaults(draft, error);
+      setOutcome(html`<${Refusal} error=${error} onGo=${goTo} />`);
+      focusFault(box.current);
+    } finally {
+      isSending.current = false;
+    }
+  };
+  const focus = (element) => isFocused && element.closest("form").querySelector(".send").focus();
+  return html`<form novalidate onSubmit=${submit} ref=${box}>
+    <${Fields} schema=${schema} draft=${draft} onReady=${focus} ...${options} />
+    <button class="send">${label}</button>
+    <div role="status">${outcome}</div>
+  </form>`;
+}
+
+// The same by the name of a schema.
+export function NamedForm({ name, ...more }) {
+  const loaded = useLoaded(() => schemaNamed(name), [name]);
+  return html`<${Loaded} loaded=${loaded}>
+    ${(schema) => html`<${SchemaForm} schema=${schema} ...${more} />`}
+  <//>`;
+}
+
+// A form that posts to a part of a material, under the entity tag that was read; then the revision of the answer is shown. A
+// client that comes second sees what the first one has changed, and can repeat its own change.
+export function WriteForm({ name, material, part, ...more }) {
+  const seen = useRef(material);
+  const send = async (json) => {
+    const { slug, latest, etag } = seen.current;
+    try {
+      const { revision } = await post(path(slug, part), json, { headers: { "If-Match": etag } });
+      swap(`materials/${slug}`, { revision });
+      return null;
+    } catch (error) {
+      if (error.status !== 412) throw error;
+      seen.current = await readMaterial(slug);
+      return html`<${Notice} kind="warn" title="Another client changed it meanwhile">
+        <p>Your change is not lost. Since you read the material:</p>
+        <${Differences} slug=${slug} first=${latest} second=${seen.current.latest} />
+        <button>Make my change all the same</button>
+      <//>`;
+    }
+  };
+  return html`<${NamedForm} name=${name} send=${send} ...${more} />`;
+}
