@@ -73,6 +73,10 @@ file(READ LICENSE licence)
 string(REGEX REPLACE ".*\n\n(Permission)" "\\1" licence "${licence}")
 string(REPLACE "\n" "\n " licence "${licence}")
 string(REPLACE "\n \n" "\n .\n" licence "${licence}")
+file(READ web/vendor/dejavu/LICENSE vera)
+string(REGEX REPLACE ".*\n\n(Permission)" "\\1" vera "${vera}")
+string(REPLACE "\n" "\n " vera "${vera}")
+string(REPLACE "\n \n" "\n .\n" vera "${vera}")
 file(WRITE ${PAGES}/deb/copyright "Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
 Upstream-Name: impactd
 Comment: The program is linked with FFTW, which is under the GNU General Public
@@ -98,6 +102,14 @@ Copyright: 2016 The Inter Project Authors
 License: OFL-1.1
  The whole text is in web/vendor/inter/LICENSE of the sources, and at
  https://openfontlicense.org.
+
+Files: web/vendor/dejavu/*
+Copyright: 2003 Bitstream, Inc.
+License: bitstream-vera
+ Bitstream Vera is a trademark of Bitstream, Inc. DejaVu changes are in public
+ domain.
+ .
+ ${vera}
 
 License: Apache-2.0 and Expat
  The Apache License 2.0 is in /usr/share/common-licenses/Apache-2.0; the

@@ -30,3 +30,23 @@ export const places = {
   Proposal: "drop-tests#make-a-revision-of-it",
   "Add and exchange": "materials#share-and-exchange",
 };
+
+// What a "?" says in one sentence before it leads to the guide: name -> [sentence, place].
+export const hints = {
+  "Restitution e": [
+    "The speed after the contact divided by the speed before it: 1 loses no energy, 0 loses all.",
+    "concepts#impacts",
+  ],
+  "Error estimate": [
+    "The largest error of the displacement over the whole run, as a share of its largest value.",
+    "concepts#error-estimate",
+  ],
+  "Trust horizon": [
+    "Up to this time the motion is right to a millionth of its largest value; later only statistics and spectra hold.",
+    "concepts#trust-horizon",
+  ],
+  "Mean acceleration": [
+    "The change of velocity over each sample interval, divided by it: it contains every impulse, as an accelerometer does.",
+    "concepts#channels",
+  ],
+};

@@ -2,14 +2,14 @@
 const KEY = "impactd.theme";
 
 export function themed(button) {
-  const root = document.documentElement,
-    system = matchMedia("(prefers-color-scheme: dark)");
+  const root = document.documentElement;
+  const system = matchMedia("(prefers-color-scheme: dark)");
   const isDark = () => (root.dataset.theme ? root.dataset.theme === "dark" : system.matches);
   function set(theme) {
     if (theme) root.dataset.theme = theme;
     button.hidden = false;
-    button.textContent = isDark() ? "Light" : "Dark";
     button.ariaLabel = `Use ${isDark() ? "light" : "dark"} colours`;
+    button.title = button.ariaLabel;
     dispatchEvent(new Event("themechange")); // plots draw themselves anew
   }
   button.onclick = () => {

@@ -1,7 +1,7 @@
 // One chart: series over one axis, with marks of events, shaded spans, rules, zoom, a cursor with a tooltip, a legend that
 // hides and isolates, its picture and its numbers to take along. Everything is SVG: the page's style colours it.
 import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
-import { withSubscripts } from "../ui/controls.js";
+import { Help, withSubscripts } from "../ui/controls.js";
 import { announce } from "../ui/announce.js";
 import { freshId } from "../ui/ids.js";
 import { quantity } from "../units.js";
@@ -57,6 +57,7 @@ function valueDomain(y, series, rules, domain) {
 //   x, y                 {label, unit, log, domain, categories}: without `domain` what the values need
 //   series               [{kind, label, unit, color, x, y, …}], see series.js; `x` and `y` are arrays that nobody changes
 //   spans, rules, markers  [{from, to, label}]; [{x or y, label, color}]; [{x, label, color, onPick}]
+//   help                 a name of help.js
 //   height               of the plot, in pixels
 //   range, onRange       the part of x in view, null for all; without onRange the chart keeps it
 //   group                charts of one group share the cursor
@@ -126,6 +127,7 @@ export function Chart(props) {
   return html`<figure class="chart" aria-label=${title}>
     <div class="chart-head">
       <h3>${withSubscripts(heading)}</h3>
+      ${props.help && html`<${Help} name=${props.help} />`}
       ${
         props.series.length > 1 &&
         html`<${Legend} series=${props.series} hidden=${hidden} setHidden=${setHidden} />`

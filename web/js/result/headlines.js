@@ -29,25 +29,21 @@ function effect(label, summary, units, name, place) {
 }
 
 function accuracy({ error_estimate: error, trust_horizon: horizon }) {
-  const place = "concepts#error-estimate";
-  const hint =
-    "The largest error of the displacement over the run, as a share of its largest value.";
-  if (error === null) return { label: "Accuracy", value: "not known", place, hint };
+  const help = "Error estimate";
+  if (error === null) return { label: "Accuracy", value: "not known", help };
   if (horizon !== null)
     return {
       label: "Accuracy",
       value: `to ${quantity(horizon, "s", 3)}`,
       note: "later only statistics and spectra hold",
       tone: "limited",
-      place: "concepts#trust-horizon",
-      hint: "Up to the trust horizon the motion is right to a millionth of its largest value.",
+      help: "Trust horizon",
     };
   return {
     label: "Accuracy",
     value: error === 0 ? "exact" : share(error, 2),
     note: "of the largest displacement",
-    place,
-    hint,
+    help,
   };
 }
 

@@ -79,7 +79,7 @@ export function ImpactPanel() {
         return html`
           <div class="impact-head">
             <h3>Impact ${row.number} <span class="quiet">of ${number(total)}</span></h3>
-            <${Help} name="Impacts" hint="An impact is one contact of the free mass with a stop." />
+            <${Help} name="Impacts" />
             <span class="actions">
               <${IconButton}
                 label="Previous impact"
@@ -101,7 +101,7 @@ export function ImpactPanel() {
             ${FACTS.map(
               ([label, key, unit]) =>
                 html`<div>
-                  <dt>${label}</dt>
+                  <dt>${label} <${Help} name=${label} /></dt>
                   <dd>${quantity(row[key], unit)}</dd>
                 </div>`,
             )}

@@ -1,6 +1,7 @@
 // How a result was computed: how exact it is, what was decided and why, what the buffers came to, the structure's modes.
 import { html } from "../ui/preact.js";
 import { link } from "../address.js";
+import { Help } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
@@ -68,7 +69,21 @@ export function Method() {
     { label: "Frequency", unit: "Hz", value: (row) => row.frequency },
     { label: "Damping ratio", unit: "1", value: (row) => row.damping_ratio },
   ];
-  return html`<p>${accuracyText(summary)}</p>
+  const { error_estimate: error, trust_horizon: horizon } = summary;
+  const accuracy = [
+    ["Error estimate", error === null ? "–" : share(error, 2)],
+    ["Trust horizon", horizon === null ? "the whole run" : quantity(horizon, "s")],
+  ];
+  return html`<dl class="figures">
+      ${accuracy.map(
+        ([label, value]) =>
+          html`<div>
+            <dt>${label} <${Help} name=${label} /></dt>
+            <dd>${value}</dd>
+          </div>`,
+      )}
+    </dl>
+    <p>${accuracyText(summary)}</p>
     <p>${cost}</p>
     <dl class="decisions">
       ${plan.decisions.map(

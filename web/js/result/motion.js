@@ -212,6 +212,7 @@ export function Motion() {
         return html`<${Chart}
           key=${chart.key}
           title=${chart.title}
+          help=${chart.title}
           x=${{ label: "Time", unit: "s", domain: [0, window.end] }}
           y=${{ label: chart.title, unit: chart.unit }}
           height=${heights[Math.min(at, heights.length - 1)]}

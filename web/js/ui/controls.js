@@ -1,5 +1,5 @@
 // Small parts of pages: buttons, notices, panels, tabs, menus, headline numbers.
-import { places } from "../help.js";
+import { hints, places } from "../help.js";
 import { html, useEffect, useRef, useState } from "./preact.js";
 import { announce } from "./announce.js";
 import { freshId } from "./ids.js";
@@ -93,11 +93,38 @@ export function Loaded({ loaded, children }) {
   return children(loaded.data);
 }
 
-// A "?" that leads to the guide's place on what a heading names; `hint` is one sentence shown at the pointer.
-export function Help({ name, place = places[name], hint }) {
+const guideLink = (place) => `guide/${place.replace(/#|$/, ".html$&")}`;
+
+// A "?" on what a heading names: it opens a sentence where help.js has one, else it leads to the guide.
+export function Help({ name, place = places[name] }) {
+  if (hints[name]) return html`<${Hint} name=${name} />`;
   if (!place) return null;
-  const target = `guide/${place.replace(/#|$/, ".html$&")}`;
-  return html`<a class="help" href=${target} aria-label=${`Guide: ${name}`} title=${hint}>?</a>`;
+  return html`<a class="help" href=${guideLink(place)} aria-label=${`Guide: ${name}`}>?</a>`;
+}
+
+// One sentence in a box beside its "?"; Escape and a click elsewhere close it.
+function Hint({ name }) {
+  const id = useRef(null);
+  id.current ??= freshId("hint");
+  const [sentence, place] = hints[name];
+  const put = ({ newState, currentTarget: box }) => {
+    if (newState !== "open") return;
+    const { left, bottom } = box.previousElementSibling.getBoundingClientRect();
+    box.style.left = `${Math.max(8, Math.min(left, innerWidth - box.offsetWidth - 8))}px`;
+    box.style.top = `${Math.min(bottom + 6, innerHeight - box.offsetHeight - 8)}px`;
+  };
+  return html`<button
+      type="button"
+      class="help"
+      popovertarget=${id.current}
+      aria-label=${`What is it: ${name}`}
+    >
+      ?
+    </button>
+    <div class="hint-box" popover="auto" id=${id.current} onToggle=${put}>
+      <p>${sentence}</p>
+      <a href=${guideLink(place)}>More in the guide</a>
+    </div>`;
 }
 
 export const Panel = ({ title, help = title, actions, children }) =>
@@ -201,15 +228,15 @@ export const withSubscripts = (text) =>
     .split(/\b([A-Za-z])_([a-z])\b/)
     .map((part, at) => (at % 3 === 2 ? html`<sub>${part}</sub>` : part));
 
-// Headline numbers: [{label, value, note, tone, help}].
+// Headline numbers: [{label, value, note, tone, help, place}], `help` a name of help.js, `place` one of the guide.
 export const Headlines = ({ items }) =>
   html`<dl class="headlines">
     ${items.map(
-      ({ label, value, note, tone, hint, place }) =>
+      ({ label, value, note, tone, help = label, place }) =>
         html`<div class=${tone}>
           <dt>
             <span>${withSubscripts(label)}</span>
-            ${place && html`<${Help} name=${label} place=${place} hint=${hint} />`}
+            <${Help} name=${help} place=${place} />
           </dt>
           <dd>${value}${note && html`<small>${note}</small>`}</dd>
         </div>`,

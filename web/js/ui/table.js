@@ -145,8 +145,10 @@ export function Table({
                   const content = column.cell?.(row) ?? textOf(column, row, at);
                   const kind = formats[at] ? "number" : null;
                   return at === 0
-                    ? html`<th scope="row" class=${kind}>${content}</th>`
-                    : html`<td class=${kind}>${content}</td>`;
+                    ? html`<th scope="row" class=${kind} data-label=${headOf(column, at)}>
+                        ${content}
+                      </th>`
+                    : html`<td class=${kind} data-label=${headOf(column, at)}>${content}</td>`;
                 })}
               </tr>`,
           )}
