@@ -16,6 +16,7 @@ export async function pages(daemon) {
     { name: "result", hash: `#/results/${sponge}`, wants: /impact/ },
     { name: "result-impulse", hash: `#/results/${await result("paper_free_sponge", { contact: { model: "impulse" } })}`, wants: /impact/ },
     { name: "result-frame", hash: `#/results/${await result("frame_two_dampers")}`, wants: /impact/ },
+    { name: "report", hash: `#/results/${sponge}/report`, wants: /Inputs/ },
     { name: "compare", hash: `#/compare?a=${sponge}&b=${aluminium}`, wants: /force/ },
     { name: "compare-empty", hash: "#/compare", wants: /./ },
     { name: "materials", hash: "#/materials", wants: /Sponge/ },

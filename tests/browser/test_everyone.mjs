@@ -15,12 +15,18 @@ test("The title, a heading and the way on are there before any answer of the ser
   await page.getByRole("button", { name: /^Run/ }).first().waitFor();
 });
 
-test("On paper a page has its content and no buttons, dark on white, all of its tables", async ({ daemon, url, newPage }) => {
+test("The report of a result has its numbers, charts, impacts and inputs; on paper nothing is cut off, no controls, dark on white", async ({ daemon, url, newPage }) => {
   const page = await newPage({ colorScheme: "dark", viewport: { width: 760, height: 900 } });
   const result = await sponge(daemon);
   await settle(page, url(result.hash), result);
+  await settle(page, () => page.getByRole("link", { name: "Report", exact: true }).click(), { wants: /Inputs/ });
+  await page.getByRole("button", { name: "Print or save as PDF" }).waitFor();
+  for (const name of ["Motion", "Spectrum", "Impacts", "Energy", "How it was computed", "Inputs"])
+    await page.getByRole("heading", { name, exact: true, level: 2 }).waitFor();
+  assert.ok((await page.locator("main figure.chart").count()) >= 4);
+  await says(page.getByRole("region", { name: "Inputs" }), /Damper 1, clearance\s*15 mm/);
   await page.emulateMedia({ media: "print" });
-  assert.equal(await page.getByRole("button").count(), 0);
+  assert.equal(await page.getByRole("button", { name: /Copy|PNG|SVG|Play|Theme|studies|Print/ }).count(), 0);
   assert.equal(await page.getByRole("navigation").count(), 0);
   await until("the page to fit", async () => (await overflow(page)) === 0, 2000);
   const light = await page.evaluate(() => getComputedStyle(document.body).color.match(/\d+/g).slice(0, 3).every((part) => Number(part) < 90));

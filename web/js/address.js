@@ -3,7 +3,10 @@
 // {path: ["results", "r-1"], query: {from: "0", to: "2"}}
 export function read() {
   const [path, query] = location.hash.replace(/^#\/?/, "").split(/\?(.*)/s);
-  return { path: path.split("/").filter(Boolean).map(decode), query: Object.fromEntries(new URLSearchParams(query ?? "")) };
+  return {
+    path: path.split("/").filter(Boolean).map(decode),
+    query: Object.fromEntries(new URLSearchParams(query ?? "")),
+  };
 }
 
 function decode(word) {
@@ -42,12 +45,17 @@ export function note(changes, push = false) {
 // A text for the URL from a value, and back: JSON, deflated, in base64url.
 const through = (data, step) => new Response(new Blob([data]).stream().pipeThrough(step));
 export async function pack(value) {
-  const bytes = await through(JSON.stringify(value), new CompressionStream("deflate-raw")).arrayBuffer();
+  const bytes = await through(
+    JSON.stringify(value),
+    new CompressionStream("deflate-raw"),
+  ).arrayBuffer();
   const text = Array.from(new Uint8Array(bytes), (byte) => String.fromCharCode(byte)).join("");
   return btoa(text).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
 export async function unpack(text) {
-  const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));
+  const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (letter) =>
+    letter.charCodeAt(0),
+  );
   return through(bytes, new DecompressionStream("deflate-raw")).json();
 }

@@ -22,14 +22,27 @@ export const address = (path) => new URL(path, home).href;
 
 async function send(method, path, { json, body, type, headers, query, signal }) {
   const url = new URL(path, home);
-  for (const [name, value] of Object.entries(query ?? {})) if ((value ?? "") !== "") url.searchParams.set(name, value);
+  for (const [name, value] of Object.entries(query ?? {}))
+    if ((value ?? "") !== "") url.searchParams.set(name, value);
   const kind = json ? "application/json" : type;
-  const sent = { ...headers, ...(kind && { "Content-Type": kind }), ...(token() && { Authorization: `Bearer ${token()}` }) };
+  const sent = {
+    ...headers,
+    ...(kind && { "Content-Type": kind }),
+    ...(token() && { Authorization: `Bearer ${token()}` }),
+  };
   try {
-    return await fetch(url, { method, headers: sent, body: json ? JSON.stringify(json) : body, signal });
+    return await fetch(url, {
+      method,
+      headers: sent,
+      body: json ? JSON.stringify(json) : body,
+      signal,
+    });
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Refusal(0, { title: "The server does not answer", detail: "Is it running? Nothing is lost here." });
+    throw new Refusal(0, {
+      title: "The server does not answer",
+      detail: "Is it running? Nothing is lost here.",
+    });
   }
 }
 
@@ -48,13 +61,17 @@ export async function ask(method, path, { signal = shown, ...more } = {}) {
 }
 
 // The answer's JSON.
-export const get = async (path, query, signal) => (await ask("GET", path, { query, signal })).json();
-export const post = async (path, json, options) => (await ask("POST", path, { ...options, json })).json();
+export const get = async (path, query, signal) =>
+  (await ask("GET", path, { query, signal })).json();
+export const post = async (path, json, options) =>
+  (await ask("POST", path, { ...options, json })).json();
 export const remove = async (path) => (await ask("DELETE", path)).json();
 
 // A file saved under `name`. With a token it is fetched first, since a link cannot carry one.
 export async function save(path, name) {
-  const href = token() ? URL.createObjectURL(await (await ask("GET", path, { signal: null })).blob()) : address(path);
+  const href = token()
+    ? URL.createObjectURL(await (await ask("GET", path, { signal: null })).blob())
+    : address(path);
   Object.assign(document.createElement("a"), { download: name, href }).click();
   setTimeout(() => URL.revokeObjectURL(href), 60000);
 }

@@ -34,7 +34,7 @@ class ClassicContext {
 }
 
 // What the parts of the page share, by the address as it is now.
-function useResultContext(result, signal) {
+export function useResultContext(result, signal) {
   const [, redraw] = useState(0);
   const classic = useMemo(() => {
     const change = (changes, push = false) => {
@@ -175,6 +175,7 @@ function ResultPage({ address, signal }) {
             >Change this scene</a
           >
           <a class="button" href=${link("compare", { a: loaded.data.id })}>Compare with …</a>
+          ${hasStudies && html`<a class="button" href=${link(`results/${loaded.data.id}/report`)}>Report</a>`}
           ${hasStudies && html`<${StudyButtons} scene=${loaded.data.scene} onChoose=${setChosen} />`}
         </div>`
       }

@@ -135,8 +135,7 @@ function SpectrumChart({ psd, names, ids, others }) {
       onRange=${(next) => change({ psd_from: next?.[0].toPrecision(8), psd_to: next?.[1].toPrecision(8) }, true)}
     />
     <p class="hint">
-      ${summary} Welch's method: ${psd.segments} segments of ${psd.segment} samples, window
-      ${psd.window}.
+      ${`${summary} Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`}
     </p>
     <details open=${ids.length > 0}>
       <summary>Lay other results over it</summary>

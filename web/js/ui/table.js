@@ -23,7 +23,10 @@ export function columnFormat(values, unit, digits = 4) {
   const write = (value) => {
     if (!isNumber(value)) return number(value, digits);
     return isPlain
-      ? (value / factor).toFixed(places).replace("-", "−")
+      ? (value / factor)
+          .toFixed(places)
+          .replace(/^-(?=[0.]*$)/, "")
+          .replace("-", "−")
       : number(value / factor, digits);
   };
   return { factor, unit: shown === "1" ? "" : pretty(shown), write };
