@@ -1,0 +1,24 @@
+// How to begin from a shell: the lines that curl gets at the service's root.
+import { ask } from "./api.js";
+import { CopyButton, Loaded } from "./ui/controls.js";
+import { pageOf } from "./ui/page.js";
+import { html } from "./ui/preact.js";
+import { useLoaded } from "./ui/store.js";
+
+const load = async (signal) =>
+  (await ask("GET", "", { headers: { Accept: "text/plain" }, signal })).text();
+
+function Shell() {
+  const loaded = useLoaded(load, []);
+  const lines = (text) =>
+    html`<${CopyButton} text=${text} />
+      <pre tabindex="0">${text}</pre>`;
+  return html`<h1>For the shell</h1>
+    <p>
+      Scripts can do everything that this page can. These lines run as printed;${" "}
+      <a href="openapi.json">openapi.json</a> has the whole contract.
+    </p>
+    <${Loaded} loaded=${loaded}>${lines}<//>`;
+}
+
+export const page = pageOf(() => "For the shell", Shell);
