@@ -80,7 +80,7 @@ test("A double click runs a point once", async ({ page, daemon, url }) => {
   await page.goto(url(`#/results/${result}?point=3`));
   let sent = 0;
   page.on("request", (request) => request.method() === "POST" && /v1\/jobs/.test(request.url()) && sent++);
-  const scene = await hold(page, /\/scene/);
+  const scene = await hold(page, /v1\/.*\/scene/);
   await button(page, "Run this point").dblclick();
   await scene.asked();
   await scene.letGo();

@@ -4,7 +4,6 @@ import { go } from "./address.js";
 import { check, schema, submit } from "./api.js";
 import { button, failure, faults, fill, h, help, once, panel } from "./dom.js";
 import { makeDraft } from "./draft.js";
-import { drawing } from "./drawing.js";
 import { examplesDialog } from "./examples.js";
 import { focusField } from "./form.js";
 import { outcome, places } from "./outcome.js";
@@ -12,8 +11,10 @@ import { bufferWidget } from "./picker.js";
 import { recordWidget } from "./record_widget.js";
 import { sceneForm } from "./scene_form.js";
 import { keep, open, sponge } from "./scene_state.js";
+import { Drawing } from "./scene/drawing.js";
 import { makeHistory } from "./scene/history.js";
 import { showLive } from "./scene/live.js";
+import { html, render } from "./ui/preact.js";
 
 const widgets = [[/^\/dampers.*buffer$/, bufferWidget], [/^\/excitation\/name$/, recordWidget], [/^\/accuracy$/, accuracyWidget]];
 
@@ -48,7 +49,7 @@ async function show(host, address, signal) {
       panel("Estimate", state, comes))));
   const past = makeHistory(draft);
   showLive(live, draft, past, signal);
-  const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
+  const draw = () => render(html`<${Drawing} scene=${structuredClone(draft.scene)} plan=${draft.check?.plan} />`, drawn);
   draw();
 
   let timer, turn = 0, isEdited = false, isUnkept = false, loading;
@@ -132,7 +133,7 @@ async function show(host, address, signal) {
   }).catch(faults(steps));
   return {
     change: ({ query }) => load(query),
-    leave: () => clearTimeout(timer),
+    leave: () => (clearTimeout(timer), render(null, drawn)),
   };
 }
 

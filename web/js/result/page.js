@@ -6,7 +6,7 @@ import { Failure, Loaded, Notice, Panel, Tabs } from "../ui/controls.js";
 import { useLoaded, useStore } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
 import { Ledger } from "../ledger.js";
-import { section as animation } from "../animation.js";
+import { Animation } from "./animation.js";
 import { ResultContext, windowOf } from "./context.js";
 import { Energy } from "./energy.js";
 import { Files } from "./files.js";
@@ -55,6 +55,7 @@ export function useResultContext(result, signal) {
     path: classic.path,
     ledger: classic.ledger,
     change: classic.change,
+    signal,
   };
 }
 
@@ -91,9 +92,6 @@ export function ResultView({ result, signal }) {
     />
   <//>`;
 }
-
-const Animation = () =>
-  html`<section aria-label="In slow motion"><${Section} section=${animation} /></section>`;
 
 // Remarks: none of them changes the numbers above.
 const Warnings = ({ warnings }) =>

@@ -61,12 +61,12 @@ export const svgBlob = (svg) =>
 // Draws an SVG element with `width` and `height` on a canvas, `ratio` pixels per pixel.
 export async function drawSvg(svg, canvas, ratio = 2) {
   const [width, height] = ["width", "height"].map((name) => Number(svg.getAttribute(name)));
-  Object.assign(canvas, { width: width * ratio, height: height * ratio });
   const url = URL.createObjectURL(svgBlob(svg));
   try {
     const image = new Image();
     image.src = url;
-    await image.decode();
+    await image.decode(); // before the canvas is emptied: somebody may be recording it
+    Object.assign(canvas, { width: width * ratio, height: height * ratio });
     canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height);
   } finally {
     URL.revokeObjectURL(url);
