@@ -8,21 +8,47 @@ const open = async (page, daemon, url, name, query = "") => {
   return page.getByRole("main");
 };
 
-test("A sweep's map: a cell tells its number, a click opens its point, the point runs", async ({ page, daemon, url }) => {
-  const main = await open(page, daemon, url, "sweep_clearance_buffer", "?metric=peak_contact_force");
-  await says(main, /2\.277 N at buffer sponge@1, clearance 2 mm to 566\.1 N at buffer aluminium@1, clearance 28 mm/);
-  const cells = page.getByRole("grid", { name: "Peak contact force: buffer up, clearance across" }).getByRole("row", { name: /sponge/ }).getByRole("gridcell");
-  await cells.nth(25).hover();
-  await says(main, /buffer sponge@1, clearance 27 mm: \d/);
-  await cells.last().click();
-  await says(main, /Point 26\s+Buffer\s+sponge@1\s+Clearance\s+28 mm/);
-  await leads(page, /point=26/);
-  await page.getByRole("button", { name: "Run this point" }).click();
+test("A sweep over a buffer and a clearance: a line for each buffer, the best point in words; a point opens, moves and runs", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "sweep_clearance_buffer", "?metric=rms_displacement");
+  await says(main, /Least RMS displacement: 1\.\d+ mm at buffer soft rubber, clearance 28 mm, [\d.]+ % below the given scene and [\d.]+ % below the structure without its damper\./);
+  await says(main, /edge of the range of the clearance/);
+  const chart = page.getByRole("figure", { name: "RMS displacement" });
+  for (const name of ["sponge", "soft rubber", "hard rubber", "hard acrylic", "aluminium"]) await says(chart, new RegExp(name));
+  for (const name of ["RMS acceleration", "Impacts", "Peak contact force"]) await page.getByRole("figure", { name }).waitFor();
+  const { width, height } = await page.getByRole("application", { name: "RMS displacement" }).boundingBox();
+  await page.getByRole("application", { name: "RMS displacement" }).click({ position: { x: width - 20, y: height * 0.7 } });
+  const point = page.getByRole("group", { name: "Point" });
+  await says(point, /Clearance\s+28 mm/);
+  await leads(page, /point=\d+/);
+  await point.getByRole("slider", { name: "Buffer" }).fill("0");
+  await leads(page, /point=26\b/);
+  await says(point, /Point 26[^]*Buffer\s+sponge/);
+  await point.getByRole("button", { name: "Run this point" }).click();
   await leads(page, /#\/results\/r-\w+$/);
   await page.goBack();
   await page.getByRole("link", { name: "Change its scene" }).click();
   await leads(page, /#\/scene\?s=/);
   await until("the point's clearance", async () => (await page.getByRole("textbox", { name: "Clearance" }).inputValue()) === "0.028");
+});
+
+test("A sweep over two numbers is contours: colours with numbers, the value under the pointer, a click opens a point", async ({ page, daemon, url }) => {
+  const axes = [{ pointer: "/dampers/0/mass", from: 0.05, to: 0.2, count: 7 }, { pointer: "/dampers/0/clearance", from: 0.005, to: 0.03, count: 11 }];
+  const job = await daemon.run("paper_free_sponge", { study: { kind: "sweep", axes, metrics: ["rms_displacement"] } });
+  const { columns } = await daemon.get(`/v1/results/${job.result}/table.json`);
+  const main = page.getByRole("main");
+  await page.goto(url(`#/results/${job.result}`));
+  await says(main, /RMS displacement: mass \[kg\] upwards/);
+  await says(main, /Least RMS displacement: [\d.]+ mm at mass [\d.]+ kg, clearance [\d.]+ mm/);
+  const picture = page.getByRole("img", { name: "RMS displacement", exact: true });
+  const { width, height } = await picture.boundingBox();
+  await picture.hover({ position: { x: width - 18, y: 14 } });
+  const last = (columns.rms_displacement.values.at(-1) * 1e3).toPrecision(4);
+  await says(main, new RegExp(`mass 0\\.2 kg, clearance 30 mm: ${Number(last)} mm`));
+  await picture.click({ position: { x: 66, y: height - 40 } });
+  await says(page.getByRole("group", { name: "Point" }), /Point 0/);
+  const [first] = columns.rms_displacement.values;
+  await says(page.getByRole("group", { name: "Point" }), new RegExp(`${Number((first * 1e3).toPrecision(4))} mm`));
+  assert.deepEqual(await axe(page), []);
 });
 
 test("A study's chart opened by itself has its colours, light and dark", async ({ daemon, newPage }) => {
@@ -45,27 +71,28 @@ test("Below a study stands the scene's own run", async ({ page, daemon, url }) =
   await says(page.getByRole("tabpanel"), /10 s of motion, 22 contacts and 10001 samples\./);
 });
 
-test("A sweep's map by keyboard, and its URL gives the same point again", async ({ page, daemon, url, newPage }) => {
-  const main = await open(page, daemon, url, "sweep_clearance_buffer");
-  const grid = page.getByRole("grid", { name: /RMS displacement:/ });
-  await tabTo(page, grid.locator("[tabindex='0']"));
-  for (const key of ["ArrowRight", "ArrowUp"]) await page.keyboard.press(key);
-  await says(main, /buffer soft_rubber@1, clearance 3 mm: /);
-  await page.keyboard.press("Enter");
+test("A sweep's points by keyboard, and its URL gives the same point again", async ({ page, daemon, url, newPage }) => {
+  const main = await open(page, daemon, url, "sweep_clearance_buffer", "?point=0");
+  const point = page.getByRole("group", { name: "Point" });
+  await tabTo(page, point.getByRole("slider", { name: "Buffer" }));
+  await page.keyboard.press("ArrowRight");
+  await leads(page, /point=27\b/);
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("ArrowRight");
   await says(main, /Point 28/);
   assert.deepEqual(await axe(page), []);
   const other = await newPage({ viewport: { width: 360, height: 800 }, colorScheme: "dark" });
   await other.goto(page.url());
-  await says(other.getByRole("main"), /Point 28\s+Buffer\s+soft_rubber@1/);
+  await says(other.getByRole("group", { name: "Point" }), /Point 28[^]*Buffer\s+soft rubber/);
   assert.equal(await overflow(other), 0);
 });
 
-test("A sweep over one number is lines, whose points open", async ({ page, daemon, url }) => {
+test("A sweep over a load names the worst point; its points open from the table", async ({ page, daemon, url }) => {
   const main = await open(page, daemon, url, "sweep_frequency");
-  await says(main, /12\.09 mm at excitation frequency 3\.819 Hz/);
+  await says(main, /Largest RMS displacement: 12\.09 mm at excitation frequency 3\.819 Hz\./);
   await page.getByText("All points as a table").click();
   await page.getByRole("table", { name: "61 points" }).getByRole("button", { name: "28", exact: true }).click();
-  await says(main, /Point 28\s+Excitation frequency\s+3\.819 Hz/);
+  await says(main, /Point 28[^]*Excitation frequency\s+3\.819 Hz/);
 });
 
 test("Points that fail are told with their reason, and can be made again", async ({ page, daemon, url }) => {
@@ -82,8 +109,9 @@ test("The trade of error against cost names what to take, and a way leads into t
   const job = await daemon.run("paper_free_sponge", { study: { kind: "tradeoff", repeats: 1, solvers: ["exact", "rk4"] } });
   await page.goto(url(`#/results/${job.result}`));
   // Which of its sample rates is cheapest is measured, and so is whether a closer one takes hardly longer.
-  await says(main, /Take exact[.,]/);
+  await says(main, /Take exact[:,]/);
   await says(main, /keeps? displacement within 0\.001/);
+  await says(main, /displacement wrong by [^]* of CPU time a run/);
   assert.match(await until("a link with the way", () => page.getByRole("link", { name: "rk4, step 0.0001 s" }).getAttribute("href").then((href) => /s=/.test(href) && href)), /#\/scene\?s=/);
   assert.match(await until("a link with the scene", () => page.getByRole("link", { name: "Use it in the scene" }).getAttribute("href").then((href) => /s=/.test(href) && href)), /#\/scene\?s=/);
 });

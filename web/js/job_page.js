@@ -11,7 +11,7 @@ export const page = {
   title: () => "Run",
   async show(host, address, signal) {
     const id = address.path[1], path = `v1/jobs/${encodeURIComponent(id)}`;
-    let job = await get(path), rows = null, isLooking = false;
+    let job = await get(path), looks = 0, isLooking = false;
     const state = h("p"), told = h("div"), news = h("div"), table = h("div"), fail = faults(news);
     const bar = h("progress", { max: 100, "aria-label": "Progress" }), cancelButton = button("Cancel", cancel);
     const change = h("a.button", { href: link("scene", { job: id }) }, "Change the scene");
@@ -38,9 +38,8 @@ export const page = {
 
     async function look() {
       isLooking = true;
-      const { sweepView } = await import("./sweep_view.js");
-      rows ??= await sweepView(table, `${path}/table.json`, id);
-      await rows.refresh();
+      const { showSweep } = await import("./study/sweep.js");
+      showSweep(table, { path: `${path}/table.json`, points: 0, jobId: id, again: (looks += 1) });
     }
 
     async function cancel() {

@@ -9,9 +9,11 @@ export function axisUnit(axis, domain) {
   const isChosen = chosenScale(axis.unit) !== null;
   let factor = 1;
   let unit = axis.unit === "1" ? "" : (axis.unit ?? "");
-  if (size > 0 && (isChosen || !axis.log)) {
-    [factor, unit] = unitScale(size, unit);
-    if (!isChosen && factor === 1 && (size < 0.01 || size >= 1e5)) {
+  if (size > 0) {
+    // On a logarithmic axis the prefix suits the middle.
+    const middle = axis.log && domain[0] > 0 ? Math.sqrt(domain[0] * domain[1]) : size;
+    [factor, unit] = unitScale(middle, unit);
+    if (!isChosen && !axis.log && factor === 1 && (size < 0.01 || size >= 1e5)) {
       const power = 3 * Math.floor(Math.log10(size) / 3);
       factor = 10 ** power;
       unit = `10^${power} ${unit}`.trim();

@@ -57,6 +57,7 @@ function valueDomain(y, series, rules, domain) {
 //   x, y                 {label, unit, log, domain, categories}: without `domain` what the values need
 //   series               [{kind, label, unit, color, x, y, …}], see series.js; `x` and `y` are arrays that nobody changes
 //   spans, rules, markers  [{from, to, label}]; [{x or y, label, color}]; [{x, label, color, onPick}]
+//   heading              in place of the names of the axes
 //   help                 a name of help.js
 //   height               of the plot, in pixels
 //   range, onRange       the part of x in view, null for all; without onRange the chart keeps it
@@ -64,9 +65,11 @@ function valueDomain(y, series, rules, domain) {
 //   onPick               called with (series, index) of the point that was clicked
 //   isCompact            the numbers of x are left out: another chart stands below
 //   isShort              the heading names x too, so that no line below does
+//   isFixed              without zoom and cursor: the children listen to the pointer
 //   underlay, children   further SVG below and above the series, from the plot {x, y, left, right, top, bottom}: scales, pixels
 export function Chart(props) {
   const { title, description, x, y, height = 200, isCompact = false, isShort = false } = props;
+  const { isFixed = false } = props;
   const { spans = [], rules = [], markers = [], underlay, children } = props;
   const id = useMemo(() => freshId("chart"), []);
   const box = useRef(null);
@@ -116,12 +119,15 @@ export function Chart(props) {
   };
   const latest = useRef(state);
   latest.current = state;
-  useLayoutEffect(() => handlePointers(box.current, svg.current, latest), []);
+  useLayoutEffect(
+    () => (isFixed ? undefined : handlePointers(box.current, svg.current, latest)),
+    [],
+  );
 
   const xTitle = axisUnit(x, domain).title;
   const yTitle = axisUnit({ ...y, label: y.label ?? title }, yScale.domain).title;
   const both = isShort ? `${yTitle} over ${lower(xTitle)}` : yTitle;
-  const heading = y.categories ? title : both;
+  const heading = props.heading ?? (y.categories ? title : both);
   const plot = { x: xScale, y: yScale, left, right, top, bottom };
   const summary = description ?? describe(props.series, x, y, domain);
   return html`<figure class="chart" aria-label=${title}>
@@ -146,11 +152,11 @@ export function Chart(props) {
     <div
       class="plot"
       ref=${box}
-      tabindex="0"
-      role="application"
+      tabindex=${isFixed ? null : 0}
+      role=${isFixed ? "img" : "application"}
       aria-label=${title}
       aria-describedby=${`${id}-summary`}
-      onKeyDown=${(event) => handleKey(event, latest.current)}
+      onKeyDown=${isFixed ? null : (event) => handleKey(event, latest.current)}
     >
       <svg ref=${svg} width=${width} height=${outerHeight} aria-hidden="true">
         <defs>
@@ -164,20 +170,23 @@ export function Chart(props) {
         <${XAxis} axis=${x} scale=${xScale} top=${top} bottom=${bottom} isCompact=${isCompact} />
         <g clip-path=${`url(#${id}-clip)`}>
           ${width > 0 && series.map((one) => drawSeries(one, xScale, yScale, density))}
-          ${children?.(plot)}
         </g>
+        ${width > 0 && children?.(plot)}
         <${Rules} rules=${rules} plot=${plot} />
         <${Markers} markers=${markers} plot=${plot} />
       </svg>
-      <${Cursor}
-        id=${id}
-        cursor=${cursor}
-        series=${series}
-        markers=${markers}
-        plot=${plot}
-        x=${x}
-        y=${y}
-      />
+      ${
+        !isFixed &&
+        html`<${Cursor}
+          id=${id}
+          cursor=${cursor}
+          series=${series}
+          markers=${markers}
+          plot=${plot}
+          x=${x}
+          y=${y}
+        />`
+      }
     </div>
     ${!isCompact && !isShort && html`<p class="x-title" aria-hidden="true">${xTitle}</p>`}
     <p class="visually-hidden" id=${`${id}-summary`}>${summary}</p>

@@ -112,9 +112,15 @@ const STUDIES = {
     title: "What errors of the buffers do",
     view: () => import("../sensitivity_view.js"),
   },
-  tradeoff: { title: "Error against cost", view: () => import("../tradeoff_view.js") },
-  sweep: { title: "Many points", view: () => import("../sweep_view.js") },
-  ensemble: { title: "Many runs", view: () => import("../ensemble_view.js") },
+  tradeoff: {
+    title: "Error against cost",
+    component: () => import("../study/tradeoff.js").then(({ TradeoffStudy }) => TradeoffStudy),
+  },
+  sweep: {
+    title: "Sweep",
+    component: () => import("../study/sweep.js").then(({ SweepStudy }) => SweepStudy),
+  },
+  ensemble: { title: "Ensemble", view: () => import("../ensemble_view.js") },
   optimize: { title: "The best values", view: design },
   calibrate: { title: "Parameters fitted to a measurement", view: design },
   response: { title: "Response curve", view: design },
@@ -125,15 +131,16 @@ const STUDIES = {
 function StudyView({ result, query, signal }) {
   const [isOpen, setIsOpen] = useState(false);
   const { kind } = result.study;
-  const { title, view } = STUDIES[kind];
+  const { title, view, component } = STUDIES[kind];
   const section = useMemo(
     () => ({ show: async (host, context) => (await view()).show(host, context) }),
     [kind],
   );
+  const loaded = useLoaded(async () => component?.(), [kind]);
   const context = useResultContext(result, signal);
   return html`<${ResultContext.Provider} value=${context}>
       <${Panel} title=${title} help=${title}>
-        <${Section} section=${section} />
+        ${component ? html`<${Loaded} loaded=${loaded}>${(View) => html`<${View} />`}<//>` : html`<${Section} section=${section} />`}
         <p>
           <a class="button" href=${link("scene", { result: result.id })}>Change the study</a>
           <a class="help" href=${`guide/study-${kind}.html`} aria-label="Guide: this study">?</a>

@@ -5,7 +5,7 @@ import { check, submit } from "../api.js";
 import { Button, Failure, Menu } from "../ui/controls.js";
 import { quantity } from "../units.js";
 
-const SWEEP_POINTS = 41;
+const SWEEP_POINTS = 58;
 const round = (value) => Number(value.toPrecision(3));
 
 // {name, label, text(scene), make(scene), isFor(scene)}: the member "study" of the scene.
@@ -15,9 +15,9 @@ const STUDIES = [
     label: "Sweep the clearance",
     isFor: ({ dampers }) => dampers[0]?.clearance > 0,
     text: ({ dampers: [{ clearance }] }) =>
-      `${SWEEP_POINTS} runs with clearances from ${quantity(round(0.2 * clearance), "m")} to ${quantity(round(3 * clearance), "m")}`,
+      `${SWEEP_POINTS} runs with clearances from ${quantity(round(0.2 * clearance), "m")} to ${quantity(round(4 * clearance), "m")}`,
     make: ({ dampers: [{ clearance }] }) => {
-      const ends = { from: round(0.2 * clearance), to: round(3 * clearance) };
+      const ends = { from: round(0.2 * clearance), to: round(4 * clearance) };
       return {
         kind: "sweep",
         axes: [{ pointer: "/dampers/0/clearance", ...ends, count: SWEEP_POINTS }],

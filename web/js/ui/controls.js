@@ -1,6 +1,6 @@
 // Small parts of pages: buttons, notices, panels, tabs, menus, headline numbers.
 import { hints, places } from "../help.js";
-import { html, useEffect, useRef, useState } from "./preact.js";
+import { html, useLayoutEffect, useRef, useState } from "./preact.js";
 import { announce } from "./announce.js";
 import { freshId } from "./ids.js";
 
@@ -200,7 +200,7 @@ export const Choice = ({ label, options, value, onChange }) =>
 export function Menu({ label, children }) {
   const [isOpen, setIsOpen] = useState(false);
   const box = useRef(null);
-  useEffect(() => {
+  useLayoutEffect(() => {
     if (!isOpen) return undefined;
     const close = (event) => {
       const isAway =

@@ -24,6 +24,7 @@ const PAINT = [
   "stroke-linejoin",
   "stroke-opacity",
   "opacity",
+  "paint-order",
   "font-size",
   "font-weight",
 ];

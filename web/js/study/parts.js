@@ -1,0 +1,67 @@
+// What the pages of studies share: the sentence that a study leads to, ways to scenes and runs, names of members.
+import { html, useEffect, useState } from "../ui/preact.js";
+import { go, link, pack } from "../address.js";
+import { Button, Failure } from "../ui/controls.js";
+import { quantity, words } from "../units.js";
+
+// The scene alone, without its study.
+export const plainScene = ({ study, ...scene }) => scene;
+
+// "clearance" of "/dampers/0/clearance".
+export const memberName = (pointer) =>
+  words(pointer.replace(/^\/(dampers\/0\/)?/, "").replaceAll("/", " "));
+
+// A value of a member as people read it: a number with its unit, a name without its revision.
+export function valueText(value, unit, digits = 4) {
+  if (typeof value === "number") return quantity(value, unit, digits);
+  if (typeof value === "string") return words(value.split("@")[0]);
+  return value === null || value === undefined ? "–" : JSON.stringify(value).slice(0, 80);
+}
+
+export const between = (low, high, unit) =>
+  `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
+
+// What a study leads to: one sentence, with what follows from it.
+export const Decision = ({ children, more = [], actions }) =>
+  html`<div class="decision">
+    <p class="answer">${children}</p>
+    ${more.filter(Boolean).map((text) => html`<p>${text}</p>`)}
+    ${actions && html`<div class="actions">${actions}</div>`}
+  </div>`;
+
+// A link to the form with the scene that load() brings: the address holds it.
+export function SceneLink({ label, load, keys = [], className }) {
+  const [state, setState] = useState({});
+  useEffect(() => {
+    let isGone = false;
+    const set = (next) => isGone || setState(next);
+    Promise.resolve()
+      .then(load)
+      .then(pack)
+      .then(
+        (s) => set({ href: link("scene", { s }) }),
+        (error) => set({ error }),
+      );
+    return () => {
+      isGone = true;
+    };
+  }, keys);
+  if (state.error) return html`<${Failure} error=${state.error} />`;
+  return html`<a class=${className} href=${state.href}>${label}</a>`;
+}
+
+// A button that makes a job and goes to its result, or to the job while it runs.
+export function JobButton({ label, make, isPrimary }) {
+  const run = async () => {
+    const job = await make();
+    go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`);
+  };
+  return html`<${Button} isPrimary=${isPrimary} onClick=${run}>${label}<//>`;
+}
+
+// [smallest, largest] of the numbers among values; null where there is none.
+export function extentOfValues(values) {
+  const numbers = values.filter((value) => Number.isFinite(value));
+  if (numbers.length === 0) return null;
+  return [Math.min(...numbers), Math.max(...numbers)];
+}

@@ -1,0 +1,145 @@
+// Error against CPU time of every way to run a scene, and which to take.
+import { html, useMemo, useState } from "../ui/preact.js";
+import { go, pack } from "../address.js";
+import { Chart } from "../chart/chart.js";
+import { useResult } from "../result/context.js";
+import { share } from "../result/headlines.js";
+import { Table } from "../ui/table.js";
+import { number, quantity, words } from "../units.js";
+import { Decision, SceneLink, plainScene } from "./parts.js";
+
+// The scene run this way.
+function applied(scene, way) {
+  const known = (...names) =>
+    Object.fromEntries(names.filter((name) => way[name] !== null).map((name) => [name, way[name]]));
+  const { overlap, ...psd } = scene.output.psd ?? {};
+  return {
+    ...plainScene(scene),
+    ...known("sample_rate", "duration"),
+    accuracy: known("solver", "step", "tolerance", "modes"),
+    ...(way.contact_model && { contact: { model: way.contact_model } }),
+    ...(way.segment && {
+      output: { ...scene.output, psd: { ...psd, segment: way.segment } },
+    }),
+  };
+}
+
+// "rk4, step 0.0001 s" as "rk4, step …": ways that differ in a number alone.
+const familyOf = ({ name }) => name.replace(/ [\d.e-]+( \w+)?$/, " …");
+
+function noteOf(point, taken) {
+  if (point.why) return point.why;
+  if (point === taken) return "recommended";
+  return point.is_best || point.status !== "measured" ? "" : "beaten in both";
+}
+
+function decisionText(taken, metric, unit, recommendation) {
+  if (!taken) return `${recommendation.why}.`;
+  const error = taken.errors[metric];
+  const size = unit === "dB" ? quantity(error, "dB", 2) : share(error, 2);
+  return `Take ${taken.name}: ${words(metric)} wrong by ${size}, ${quantity(taken.cpu_minimum, "s", 2)} of CPU time a run.`;
+}
+
+export function TradeoffStudy() {
+  const { result } = useResult();
+  const { scene, study } = result;
+  const { metric, points, recommendation, error: wanted } = study;
+  const [chosen, setChosen] = useState(null); // a point
+  const unit = metric === "psd" ? "dB" : "1";
+  const taken = points[recommendation.point - 1];
+  const error = (point) => point.errors[metric];
+  const measured = useMemo(
+    () =>
+      points
+        .filter((point) => point.cpu_minimum > 0 && error(point) !== null)
+        .sort((a, b) => a.cpu_minimum - b.cpu_minimum),
+    [result.id],
+  );
+  // On a logarithmic axis an exact way stands at the lower end.
+  const least = Math.min(...measured.map(error).filter((value) => value > 0));
+  const shown = (point) => Math.max(error(point), least);
+  const series = useMemo(() => {
+    const best = measured.filter((point) => point.is_best);
+    const families = [...Map.groupBy(measured, familyOf)];
+    return [
+      {
+        label: "no way is better in both",
+        color: "ok",
+        ways: best,
+        x: best.map((point) => point.cpu_minimum),
+        y: best.map(shown),
+      },
+      ...families.map(([name, ways], at) => ({
+        kind: "points",
+        size: 9,
+        label: name,
+        color: `c${(at % 8) + 1}`,
+        ways,
+        x: ways.map((point) => point.cpu_minimum),
+        y: ways.map(shown),
+      })),
+    ];
+  }, [measured]);
+  const open = async (way) => go("scene", { s: await pack(applied(scene, way)) });
+  const marker = (plot) => {
+    if (!measured.includes(taken)) return null;
+    const [x, y] = [plot.x.to(taken.cpu_minimum), plot.y.to(shown(taken))];
+    const isLate = x > (plot.left + plot.right) / 2;
+    return html`<g class="pointer">
+      <circle cx=${x} cy=${y} r="9" />
+      <text x=${isLate ? x - 14 : x + 14} y=${y - 12} text-anchor=${isLate ? "end" : "start"}>
+        ${`take ${taken.name}`}
+      </text>
+    </g>`;
+  };
+  const columns = [
+    {
+      label: "Way",
+      value: ({ name }) => name,
+      cell: (point) =>
+        html`<${SceneLink}
+          label=${point.name}
+          load=${() => applied(scene, point)}
+          keys=${[result.id]}
+        />`,
+    },
+    { label: "CPU time", unit: "s", value: (point) => point.cpu_minimum },
+    { label: `Error of ${words(metric)}`, unit, digits: 3, value: error },
+    { label: "Steps", isNumeric: true, value: (point) => point.steps },
+    { label: "Note", value: (point) => noteOf(point, taken) },
+  ];
+  const why = recommendation.why.replace(/\d[\d.]*e-?\d+/g, (text) => number(Number(text)));
+  return html`<${Decision}
+      more=${[`${why.replace(/^./, (letter) => letter.toUpperCase())}.`, `Errors are relative to ${study.reference.solver}, whose own is ${number(study.reference.error_estimate, 2)}.`]}
+      actions=${taken && html`<${SceneLink} className="button primary" label="Use it in the scene" load=${() => applied(scene, taken)} keys=${[result.id]} />`}
+    >
+      ${decisionText(taken, metric, unit, recommendation)}
+    <//>
+    <${Chart}
+      title="Error against cost"
+      description="Down and to the left is better; a click on a point opens the scene run that way."
+      height=${340}
+      x=${{ label: "CPU time of a run", unit: "s", log: true }}
+      y=${{ label: `Error of ${words(metric)}`, unit, log: true }}
+      series=${series}
+      rules=${wanted > 0 ? [{ y: wanted, label: "wanted", color: "quiet" }] : []}
+      onPick=${(line, index) => setChosen(line.ways[index])}
+    >
+      ${marker}
+    <//>
+    ${
+      chosen
+        ? html`<p role="status">
+            ${`${chosen.name}: error ${number(error(chosen), 3)}, ${quantity(chosen.cpu_minimum, "s", 3)}. `}
+            <button type="button" onClick=${() => open(chosen)}>Use this way in the scene</button>
+          </p>`
+        : html`<p class="hint">Down and to the left is better. A click on a point names it.</p>`
+    }
+    <${Table}
+      caption="Ways to run this scene, each a link to use it"
+      columns=${columns}
+      rows=${points}
+      keyOf=${({ name }) => name}
+      chosenKey=${taken?.name}
+    />`;
+}
