@@ -51,6 +51,8 @@ void job_json_put(Bytes *bytes, const JobView *show, int parts) {
                    show->summary, show->work);
         document_join(bytes, row->warnings, show->notes);
     }
+    if (parts & JOB_PUT_DETAILS)
+        bytes_json(bytes, ", \"scene\": %p, \"summary\": %p", row->scene, show->summary);
     bytes_json(bytes, ", \"timing\": {\"queued\": %g, \"run\": %g, \"total\": %g}, \"links\": {",
                row->queued, row->run, row->total);
     if (parts & JOB_PUT_LINKS)

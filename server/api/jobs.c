@@ -334,9 +334,33 @@ enum { LIST_INITIAL = 20, LIST_MAX = 100 };
 // Unfinished jobs whose state is asked for are looked at one by one, this many at a time.
 enum { LOOKED_AT = 256 };
 
+// Of a scene in a list: with those of a hundred jobs the list is still sent at once.
+enum { LIST_SCENE_MAX = 65536 };
+
+// Puts a job of the list. With `is_detailed` its scene and its summary, null where they are long,
+// damaged or deleted.
+static void jobs_list_put(App *app, Bytes *bytes, const JobView *show, bool is_detailed) {
+    const int parts = JOB_PUT_LINKS | JOB_PUT_SENDER;
+    if (!is_detailed) {
+        job_json_put(bytes, show, parts);
+        return;
+    }
+    JobView detailed = *show;
+    char *scene = NULL;
+    ResultRow result = {.id = ""};
+    (void)db_job_scene_within(app->db, show->row.id, LIST_SCENE_MAX, &scene, NULL);
+    if (show->row.state == JOB_SUCCESSFUL)
+        (void)db_result_head(app->db, show->row.result, &result, NULL);
+    detailed.row.scene = scene;
+    detailed.summary = result.summary;
+    job_json_put(bytes, &detailed, parts | JOB_PUT_DETAILS);
+    free(scene);
+    result_row_clear(&result);
+}
+
 // A row has no progress: an unfinished job is read from the manager. False where the job is not in
 // the wanted state (-1: any).
-static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
+static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state, bool is_detailed,
                           const char *separator) {
     JobView show = {0};
     Job *job = NULL;
@@ -347,7 +371,7 @@ static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
         job_unref(job);
         if (status == STATUS_OK && is_wanted) {
             bytes_text(bytes, separator);
-            job_json_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER);
+            jobs_list_put(app, bytes, &show, is_detailed);
         }
         job_view_clear(&show);
         if (status == STATUS_OK)
@@ -357,7 +381,7 @@ static bool jobs_list_row(App *app, Bytes *bytes, const JobRow *row, int state,
         return false;
     show = (JobView){.row = *row, .progress = row->state == JOB_SUCCESSFUL ? 100 : 0};
     bytes_text(bytes, separator);
-    job_json_put(bytes, &show, JOB_PUT_LINKS | JOB_PUT_SENDER); // borrows the row's texts
+    jobs_list_put(app, bytes, &show, is_detailed); // borrows the row's texts
     return true;
 }
 
@@ -407,8 +431,8 @@ static Status search_read(const Request *request, JobSearch *search, int *state,
 }
 
 // Up to `most` jobs into `bytes`. `last` gets the last one's id where more may follow, else "".
-static Status jobs_list_page(App *app, JobSearch search, int state, Bytes *bytes, char last[40],
-                             Problem *problem) {
+static Status jobs_list_page(App *app, JobSearch search, int state, bool is_detailed, Bytes *bytes,
+                             char last[40], Problem *problem) {
     const size_t most = search.most;
     const bool is_live = state == JOB_ACCEPTED || state == JOB_RUNNING;
     char before[40];
@@ -422,8 +446,8 @@ static Status jobs_list_page(App *app, JobSearch search, int state, Bytes *bytes
         bool is_full = false;
         for (size_t i = 0; i < rows.count && !is_full; i++) {
             is_full = count == most;
-            if (!is_full &&
-                jobs_list_row(app, bytes, &rows.at[i], state, count > 0 ? ",\n " : "")) {
+            if (!is_full && jobs_list_row(app, bytes, &rows.at[i], state, is_detailed,
+                                          count > 0 ? ",\n " : "")) {
                 count++;
                 text_fit(last, 40, rows.at[i].id);
             }
@@ -445,11 +469,13 @@ static Status jobs_list_page(App *app, JobSearch search, int state, Bytes *bytes
 Status jobs_list(App *app, const Request *request, Reply *reply, Problem *problem) {
     JobSearch search;
     int state;
+    bool is_detailed = false;
     TRY(search_read(request, &search, &state, problem));
+    TRY(request_flag(request, "details", &is_detailed, problem));
     Bytes bytes = {.most = app->reply_most};
     char last[40];
     bytes_text(&bytes, "{\"jobs\": [");
-    const Status status = jobs_list_page(app, search, state, &bytes, last, problem);
+    const Status status = jobs_list_page(app, search, state, is_detailed, &bytes, last, problem);
     if (status != STATUS_OK) {
         bytes_clear(&bytes);
         return status;

@@ -97,6 +97,8 @@ Status db_job_load_with_scene(Db *db, const char *id, JobRow *row, Problem *prob
 // The scene that it asked for, to be freed: canonical JSON. STATUS_NOT_FOUND; STATUS_GONE where it
 // went with a deleted result.
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem);
+// The same if it has at most `most` characters; STATUS_NOT_FOUND or STATUS_GONE beyond.
+Status db_job_scene_within(Db *db, const char *id, size_t most, char **scene, Problem *problem);
 // The job that `client` (NULL: none) sent under that key. STATUS_NOT_FOUND.
 Status db_job_keyed(Db *db, const char *client, const char *key, JobRow *row, Problem *problem);
 typedef struct JobRows {
@@ -168,6 +170,9 @@ Status db_result_outcome(Db *db, const char *id, ResultRow *row, Problem *proble
 Status db_result_head(Db *db, const char *id, ResultRow *row, Problem *problem);
 // Id, engine and scene alone: what computing it anew takes.
 Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem);
+// The same if the scene has at most `most` characters; STATUS_NOT_FOUND beyond.
+Status db_result_scene_within(Db *db, const char *id, size_t most, ResultRow *row,
+                              Problem *problem);
 bool db_result_exists(Db *db, const char *id);
 // A client other than `client` of whose finished jobs it is the result; "" if there is none.
 Status db_result_sharer(Db *db, const char *id, const char *client, char sharer[72],

@@ -171,17 +171,23 @@ Status db_job_load_with_scene(Db *db, const char *id, JobRow *row, Problem *prob
 }
 
 Status db_job_scene(Db *db, const char *id, char **scene, Problem *problem) {
-    static const char sql[] = "SELECT id, result, scene, checks FROM jobs WHERE id = :id";
+    return db_job_scene_within(db, id, SIZE_MAX / 2, scene, problem);
+}
+
+Status db_job_scene_within(Db *db, const char *id, size_t most, char **scene, Problem *problem) {
+    static const char sql[] = "SELECT id, result, scene, checks FROM jobs "
+                              "WHERE id = :id AND length(scene) <= :before";
+    const QueryKey key = {.id = id, .before = (int64_t)most};
     JobRow row;
     ResultRow result;
     *scene = NULL;
-    TRY(db_get(db, sql, &(QueryKey){.id = id}, job_columns, &row, sizeof row, problem, no_job, id));
+    TRY(db_get(db, sql, &key, job_columns, &row, sizeof row, problem, no_job, id));
     if (row.scene[0] != '\0') {
         *scene = row.scene;
         return STATUS_OK;
     }
     free(row.scene);
-    const Status status = db_result_scene(db, row.result, &result, problem);
+    const Status status = db_result_scene_within(db, row.result, most, &result, problem);
     if (status == STATUS_NOT_FOUND) {
         problem_clear(problem);
         return problem_set(problem, STATUS_GONE,

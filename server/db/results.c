@@ -85,8 +85,15 @@ Status db_result_head(Db *db, const char *id, ResultRow *row, Problem *problem) 
 }
 
 Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem) {
-    static const char sql[] = "SELECT id, engine, scene, checks FROM results WHERE id = :id";
-    return result_load(db, sql, id, row, problem);
+    return db_result_scene_within(db, id, SIZE_MAX / 2, row, problem);
+}
+
+Status db_result_scene_within(Db *db, const char *id, size_t most, ResultRow *row,
+                              Problem *problem) {
+    static const char sql[] = "SELECT id, engine, scene, checks FROM results "
+                              "WHERE id = :id AND length(scene) <= :before";
+    const QueryKey key = {.id = id, .before = (int64_t)most};
+    return db_get(db, sql, &key, result_columns, row, sizeof *row, problem, no_result, id);
 }
 
 bool db_result_exists(Db *db, const char *id) {

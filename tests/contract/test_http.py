@@ -108,6 +108,26 @@ def test_jobs_are_listed_by_pages():
             problem(daemon.get(f"/v1/jobs?limit={limit}"), 400)
 
 
+def test_a_list_has_scenes_and_summaries_where_they_are_asked_for():
+    """GET /v1/jobs?details=1: scene and summary of each job, null where there are none or the scene is long."""
+    with program.daemon() as daemon:
+        samples = {"kind": "record", "samples": [0.125] * 20000, "interval": 0.01}
+        sent = [daemon.submit(scene).json() for scene in (sponge(), sponge(excitation=samples), sponge(duration=2))]
+        failing = {"kind": "sweep", "axes": [{"pointer": "/dampers/0/clearance", "values": [0.02, 0.01, 0.02]},
+                                             {"pointer": "/dampers/0/position", "from": 0, "to": 0.006, "count": 3000}]}
+        failed = daemon.submit(sponge(study=failing)).json()
+        failed = daemon.get(f"/v1/jobs/{failed['id']}?wait=20").json()
+        assert daemon.request("DELETE", f"/v1/results/{sent[2]['result']}").status == 204
+        jobs = {job["id"]: job for job in daemon.get("/v1/jobs?details=1").json()["jobs"]}
+        first, long, deleted, failed = (jobs[job["id"]] for job in (*sent, failed))
+        assert first["scene"] == daemon.get(f"/v1/results/{first['result']}").json()["scene"], first["scene"]
+        assert first["summary"] == sent[0]["summary"], first
+        assert long["scene"] is None and long["summary"] == sent[1]["summary"], long["summary"]
+        assert deleted["scene"] is None and deleted["summary"] is None, deleted
+        assert failed["scene"]["study"]["kind"] == "sweep" and failed["summary"] is None, failed
+        assert "scene" not in daemon.get("/v1/jobs?details=0").json()["jobs"][0]
+
+
 def test_dry_run_runs_nothing():
     """?dry_run=1 answers scene, plan and cost, makes no job, and refuses a faulty scene as without it."""
     with program.daemon() as daemon:
