@@ -47,48 +47,81 @@ test("The player by keyboard: scrub, play, pause", async ({ page, daemon, url })
   assert.ok(Math.abs(Number(told) - stood) < 1.1e-5, `it stands at ${told} s, its address says ${stood}`);
 });
 
+test("From impact to impact by buttons and by keys; at the end of a loop it begins again", async ({ page, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  const { impacts } = await daemon.get(`v1/results/${result}/impacts.json`);
+  await page.goto(url(`#/results/${result}?t=0.2`));
+  await says(player(page), /Contact force/);
+  const reaches = (number) => until(`impact ${number}`, () => Math.abs(at(page) - impacts[number - 1].start) < 1e-9);
+  const after = impacts.findIndex(({ start }) => start > 0.2) + 1;
+  await player(page).getByRole("button", { name: "Impact after" }).click();
+  await reaches(after);
+  await leads(page, new RegExp(`impact=${after}\\b`));
+  await instant(page).focus();
+  await page.keyboard.press("n");
+  await reaches(after + 1);
+  await page.keyboard.press("p");
+  await reaches(after);
+  await player(page).getByRole("button", { name: "Impact before" }).click();
+  await reaches(after - 1);
+  await page.goto(url(`#/results/${result}?from=0.1&to=0.14&t=0.139`));
+  await player(page).getByRole("button", { name: "Loop" }).click();
+  await player(page).getByRole("button", { name: "Play", exact: true }).click();
+  await until("it to begin again", () => at(page) < 0.135);
+  await player(page).getByRole("button", { name: "Pause" }).click();
+});
+
+test("A contact's force is drawn as arrows on both bodies, as long as it is large", async ({ page, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  const { impacts } = await daemon.get(`v1/results/${result}/impacts.json`);
+  const { peak_contact_force: peak } = (await daemon.get(`v1/results/${result}`)).summary;
+  await page.goto(url(`#/results/${result}?t=${impacts[0].start + 0.01}`));
+  await says(player(page), /Contact force/);
+  const [, force] = /Contact force\s+([\d.]+) N/.exec(await says(player(page), /Contact force\s+[\d.]+ N/));
+  const lengths = await player(page).getByRole("img").evaluate((svg) => [...svg.querySelectorAll(".force")].map((arrow) => arrow.getBBox().width));
+  assert.equal(lengths.length, 2);
+  const [free, pressed] = await player(page).getByRole("img").evaluate((svg) => [":not(.hit)", ".hit"].map((name) => svg.querySelector(`.pad${name}`).getBBox().width));
+  assert.ok(pressed < 0.97 * free, `the pad is ${pressed} px thick, the free one ${free} px`);
+  for (const length of lengths) assert.ok(Math.abs(length - (44 * Number(force)) / peak) < 1.5, `${length} px for ${force} of ${peak} N`);
+});
+
+test("The charts' cursor goes along while it plays; readers who prefer calm see no trail", async ({ page, newPage, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  await page.goto(url(`#/results/${result}`));
+  const chart = page.getByRole("application", { name: "Displacement" }).first();
+  await player(page).getByRole("button", { name: "Play", exact: true }).click();
+  await until("the cursor", () => chart.evaluate((plot) => plot.querySelector(".cursor line") !== null));
+  await until("a trail", () => player(page).evaluate((node) => node.querySelectorAll(".trail path").length > 4));
+  await player(page).getByRole("button", { name: "Pause" }).click();
+  const calm = await newPage({ reducedMotion: "reduce" });
+  await calm.goto(url(`#/results/${result}?t=0.5`));
+  await says(player(calm), /Contact force/);
+  assert.equal(await player(calm).evaluate((node) => node.querySelectorAll(".trail path").length), 0);
+});
+
+test("A frame is saved as PNG, a window as WebM, which shows its progress and can be cancelled", async ({ page, daemon, url }) => {
+  const { result } = await daemon.run("paper_free_sponge");
+  await page.goto(url(`#/results/${result}?from=0&to=0.2&t=0.05`));
+  await says(player(page), /Contact force/);
+  const [picture] = await Promise.all([page.waitForEvent("download"), player(page).getByRole("button", { name: /frame as PNG/ }).click()]);
+  assert.equal(picture.suggestedFilename(), "motion.png");
+  const bytes = fs.readFileSync(await picture.path());
+  assert.equal(bytes.readUInt32BE(16), 1280);
+  const film = page.waitForEvent("download", { timeout: 60000 });
+  await player(page).getByRole("button", { name: /Save as WebM: a film of [\d.]+ s/ }).click();
+  await player(page).getByRole("progressbar", { name: "Film" }).waitFor();
+  const saved = await film;
+  assert.equal(saved.suggestedFilename(), "motion.webm");
+  const video = fs.readFileSync(await saved.path());
+  assert.equal(video.readUInt32BE(0), 0x1a45dfa3); // EBML
+  assert.ok(video.length > 5000, `${video.length} bytes`);
+  await player(page).getByRole("button", { name: /Save as WebM/ }).click();
+  await player(page).getByRole("button", { name: "Cancel the film" }).click();
+  await player(page).getByRole("button", { name: /Save as WebM/ }).waitFor();
+});
+
 test("A result without the channels says which", async ({ page, daemon, url }) => {
   const { result } = await daemon.run("paper_free_sponge", { output: { channels: ["displacement"] } });
   await page.goto(url(`#/results/${result}`));
   await says(page.getByRole("region", { name: "In slow motion" }), /does not contain damper_displacement/);
-});
-
-test("The motion is played in a loop, goes from impact to impact, and is saved as a video", async ({ page, daemon, url }) => {
-  const { result } = await daemon.run("paper_free_sponge");
-  const { impacts } = await daemon.get(`v1/results/${result}/impacts.json`);
-  await page.goto(url(`#/results/${result}?from=0.1&to=0.2`));
-  await says(player(page), /Contact force/);
-  await player(page).getByRole("button", { name: "To the impact after" }).click();
-  await leads(page, /impact=2\b/);
-  await says(player(page), new RegExp(`${impacts[1].start.toFixed(5)} s`));
-  await player(page).getByRole("button", { name: "Loop" }).click();
-  await player(page).getByLabel("Speed").selectOption("2");
-  await player(page).getByRole("button", { name: "Play" }).click();
-  let last = 0;
-  await until("it to begin again", async () => {
-    const now = Number(await instant(page).inputValue());
-    const isBack = now < last - 0.01;
-    last = now;
-    return isBack;
-  });
-  await player(page).getByRole("button", { name: "Pause" }).click();
-  await player(page).getByLabel("Speed").selectOption("10");
-  const saving = page.waitForEvent("download");
-  await player(page).getByRole("button", { name: "WebM" }).click();
-  await player(page).getByRole("progressbar", { name: "Recording" }).waitFor();
-  const video = fs.readFileSync(await (await saving).path());
-  assert.equal(video.readUInt32BE(0), 0x1a45dfa3, "it is a WebM");
-  assert.ok(video.length > 10000, `it has ${video.length} bytes`);
-});
-
-test("While a buffer pushes, its pad is thinner and the force has an arrow", async ({ page, daemon, url }) => {
-  const { result } = await daemon.run("paper_free_sponge");
-  const width = async () => (await page.locator("[data-part=pad-0]").boundingBox()).width;
-  await page.goto(url(`#/results/${result}?t=0.1`));
-  await says(player(page), /0\.10000 s/);
-  const [free, arrow] = [await width(), page.locator("[data-part=force]")];
-  assert.equal(await arrow.getAttribute("visibility"), "hidden");
-  await page.goto(url(`#/results/${result}?t=0.125`));
-  await until("the force", async () => (await arrow.getAttribute("visibility")) === "visible");
-  assert.ok((await width()) < 0.97 * free, `${await width()} px, free ${free}`);
 });

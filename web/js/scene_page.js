@@ -11,10 +11,9 @@ import { bufferWidget } from "./picker.js";
 import { recordWidget } from "./record_widget.js";
 import { sceneForm } from "./scene_form.js";
 import { keep, open, sponge } from "./scene_state.js";
-import { Drawing } from "./scene/drawing.js";
+import { drawing } from "./scene/drawing.js";
 import { makeHistory } from "./scene/history.js";
 import { showLive } from "./scene/live.js";
-import { html, render } from "./ui/preact.js";
 
 const widgets = [[/^\/dampers.*buffer$/, bufferWidget], [/^\/excitation\/name$/, recordWidget], [/^\/accuracy$/, accuracyWidget]];
 
@@ -49,7 +48,7 @@ async function show(host, address, signal) {
       panel("Estimate", state, comes))));
   const past = makeHistory(draft);
   showLive(live, draft, past, signal);
-  const draw = () => render(html`<${Drawing} scene=${structuredClone(draft.scene)} plan=${draft.check?.plan} />`, drawn);
+  const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
   draw();
 
   let timer, turn = 0, isEdited = false, isUnkept = false, loading;
@@ -133,7 +132,7 @@ async function show(host, address, signal) {
   }).catch(faults(steps));
   return {
     change: ({ query }) => load(query),
-    leave: () => (clearTimeout(timer), render(null, drawn)),
+    leave: () => clearTimeout(timer),
   };
 }
 

@@ -1,384 +1,291 @@
-// A scene as a picture that can be posed: one mass on a spring and a dashpot, or storeys on columns, each free mass between
-// its pads. Poses change attributes of what is there, so that an animation costs little.
-import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
+// A scene as a picture in a state of motion: one mass on its spring and dashpot, or storeys on columns, each with its free
+// masses between their stops.
+import { html, render, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { quantity } from "../units.js";
-import { CAVITY, WALL, layout, limit } from "./layout.js";
+import { layoutOf, roundDown } from "./layout.js";
+import { limit, modelOf, MOST } from "./model.js";
+import {
+  Ball,
+  columnPath,
+  Dashpot,
+  Dimension,
+  Force,
+  Hatched,
+  px,
+  Shaking,
+  Spring,
+} from "./parts.js";
+import { Trail } from "./trail.js";
 
-const COILS = 6;
-const GHOSTS = 5; // places of a free mass' trail
-const LONGEST_ARROW = 40; // px
+const FORCE = 44; // pixels of the largest force's arrow
 
-const pixel = (value) => Math.round(limit(value, -1e5, 1e5) * 100) / 100;
-const shifted = (x) => `translate(${pixel(x)} 0)`;
+const Text = ({ x, y, name, children }) =>
+  html`<text x=${px(x)} y=${px(y)} class=${name}>${children}</text>`;
+const Block = ({ x, y, width, height, name, style, rx }) =>
+  html`<rect
+    x=${px(x)}
+    y=${px(y)}
+    width=${px(Math.max(0, width))}
+    height=${px(height)}
+    rx=${rx}
+    class=${name}
+    style=${style}
+  />`;
 
-// Short strokes beside a line from (x0, y0) to (x1, y1), as drawings mark what does not move.
-function hatching(x0, y0, x1, y1, dx, dy) {
-  const length = Math.hypot(x1 - x0, y1 - y0);
-  const steps = Math.floor(length / 8);
-  return Array.from({ length: steps + 1 }, (_, step) => {
-    const part = Math.min(1, (step * 8) / length);
-    return `M${pixel(x0 + part * (x1 - x0))} ${pixel(y0 + part * (y1 - y0))}l${dx} ${dy}`;
-  }).join("");
-}
-
-// A line with arrows at both ends; where it is too short for them they point at it from outside.
-function dimensionPath(from, to, y) {
-  const ends = `M${pixel(from)} ${y - 5}v10M${pixel(to)} ${y - 5}v10`;
-  const line = `M${pixel(from)} ${y}H${pixel(to)}`;
-  if (to - from < 16)
-    return {
-      line,
-      arrows: `${ends}M${pixel(from - 9)} ${y}h9l-5 -3m5 3l-5 3M${pixel(to + 9)} ${y}h-9l5 -3m-5 3l5 3`,
-    };
-  return {
-    line,
-    arrows: `${ends}M${pixel(from + 5)} ${y - 3}l-5 3l5 3M${pixel(to - 5)} ${y - 3}l5 3l-5 3`,
-  };
-}
-
-// From x0 to x1 along y; its ends are straight.
-function springPath(x0, x1, y) {
-  const lead = Math.min(10, (x1 - x0) / 6);
-  const step = (x1 - x0 - 2 * lead) / (2 * COILS);
-  const turns = Array.from({ length: 2 * COILS }, (_, turn) => {
-    const x = x0 + lead + (turn + 0.5) * step;
-    return `L${pixel(x)} ${y + (turn % 2 === 0 ? -7 : 7)}`;
-  }).join("");
-  return `M${pixel(x0)} ${y}h${pixel(lead)}${turns}L${pixel(x1 - lead)} ${y}H${pixel(x1)}`;
-}
-
-// The cylinder stands at the wall, the piston moves with the mass.
-function dashpotPath(x0, x1, y, { start, length }) {
-  const piston = limit(x1 - (length + 2 * (start - x0)) / 2, start + 3, start + length - 3);
-  return {
-    cylinder: `M${x0} ${y}H${start}M${pixel(start + length)} ${y - 8}H${start}v16H${pixel(start + length)}`,
-    piston: `M${pixel(piston)} ${y - 6}v12M${pixel(piston)} ${y}H${pixel(x1)}`,
-  };
-}
-
-// A column that is vertical at both ends: x = b + (a - b)(3s² - 2s³), which a Bézier curve with its controls at the thirds is.
-function columnPath(top, foot, a, b) {
-  const third = (foot - top) / 3;
-  return `M${pixel(a)} ${top}C${pixel(a)} ${pixel(top + third)} ${pixel(b)} ${pixel(foot - third)} ${pixel(b)} ${foot}`;
-}
-
-// The parts of a cavity about its storey's middle, and what a pose changes of it.
-function cavityOf(damper, scale) {
-  const { stops, offset, clearance, radius, top } = damper;
-  const middle = offset * scale;
-  const half = (clearance * scale) / 2;
-  const ends = stops.map((stop, at) => {
+// The ends of a cavity about the middle of its slab: where the free mass' middle meets a stop, and where the wall is.
+export function endsOf({ stops, offset, clearance, radius }, scale) {
+  return stops.map(({ softness, thickness, name }, at) => {
     const side = 2 * at - 1;
-    return { ...stop, side, wall: middle + side * (half + radius + stop.thickness) };
+    const meet = offset * scale + (side * clearance * scale) / 2;
+    return { side, softness, thickness, name, meet, wall: meet + side * (radius + thickness) };
   });
-  return { ...damper, middle, half, ends, y: top + CAVITY / 2, low: top + CAVITY };
 }
 
-function Cavity({ cavity, isHousing }) {
-  const { ends, top, y, low, middle, half, radius, label, dimension, index } = cavity;
-  const [start, end] = ends.map(({ wall }) => wall);
-  const { line, arrows } = dimensionPath(middle - half, middle + half, low + 7);
-  return html`<g data-damper=${index}>
-    ${isHousing && html`<rect class="housing" x=${pixel(start - 5)} y=${top - 3} width=${pixel(end - start + 10)} height=${CAVITY + 28} rx="3" />`}
-    <text x="0" y=${top - 6} class="quiet">${label}</text>
-    <rect class="cavity" x=${pixel(start)} y=${top} width=${pixel(end - start)} height=${CAVITY} />
-    ${ends.map(
-      ({ side, thickness, softness, wall }, at) =>
-        html`<circle class="ghost" cx=${pixel(middle + side * half)} cy=${y} r=${pixel(radius)} />
-          <rect
-            class="pad"
-            data-part=${`pad-${at}`}
-            y=${top}
-            width=${pixel(thickness)}
-            height=${CAVITY}
-            transform=${`translate(${pixel(wall)} 0) scale(${-side} 1)`}
-            style=${{ fill: `color-mix(in srgb, var(--pad-soft) ${pixel(softness * 100)}%, var(--pad-hard))` }}
-          />
-          <path class="stop" d=${`M${pixel(wall)} ${top}v${CAVITY}`} />`,
-    )}
-    ${Array.from(
-      { length: GHOSTS },
-      (_, at) =>
-        html`<circle
-          class="trail"
-          data-part="trail"
-          cx="0"
-          cy=${y}
-          r=${pixel(radius)}
-          style=${{ opacity: (0.4 * (at + 1)) / GHOSTS }}
-          visibility="hidden"
-        />`,
-    )}
-    <circle class="free" data-part="free" cx="0" cy=${y} r=${pixel(radius)} />
-    <path class="force" data-part="force" visibility="hidden" />
-    <path class="clearance" d=${line} />
-    <path class="dimension" d=${arrows} />
-    <text x=${pixel(middle)} y=${low + 21} class="bold">${dimension}</text>
+// A pad between its wall and the free mass: what is pressed out of its length goes to its height.
+function Pad({ end, top, tall, at }) {
+  const { side, softness, thickness, meet, wall } = end;
+  const depth = side * (at - meet);
+  const left = limit(1 - depth / thickness, 0.15, 1);
+  const width = thickness * left;
+  const color = `color-mix(in srgb, var(--pad-soft) ${Math.round(softness * 100)}%, var(--pad-hard))`;
+  const inset = 5 * left;
+  return html`<${Block}
+    x=${side < 0 ? wall : wall - width}
+    y=${top + inset}
+    width=${width}
+    height=${tall - 2 * inset}
+    rx=${Math.min(4, width / 2)}
+    name=${depth > 0.01 ? "pad hit" : "pad"}
+    style=${{ fill: color }}
+  />`;
+}
+
+function Cavity({ cavity, layout, x, place, force }) {
+  const { damper, top, tall } = cavity;
+  const { scale, isCompact } = layout;
+  const ends = endsOf(damper, scale);
+  const [start, end] = ends.map(({ wall }) => x + wall);
+  const at = place * scale;
+  const y = top + tall - damper.radius - 1;
+  const low = top + tall;
+  const middle = x + damper.offset * scale;
+  return html`<g>
+    ${!isCompact && html`<${Text} x=${x} y=${top - 7} name="quiet">${damper.label}<//>`}
+    <${Block} x=${start} y=${top} width=${end - start} height=${tall} name="cavity" rx="2" />
+    <path class="stop" d=${`M${px(start)} ${px(top)}v${tall}M${px(end)} ${px(top)}v${tall}`} />
+    ${ends.map((one) => html`<${Pad} end=${{ ...one, meet: x + one.meet, wall: x + one.wall }} top=${top} tall=${tall} at=${x + at} />`)}
+    ${
+      !isCompact &&
+      ends.map(
+        ({ meet }) =>
+          html`<g class="ghost">
+            <circle cx=${px(x + meet)} cy=${px(y)} r=${damper.radius} />
+            <path d=${`M${px(x + meet)} ${px(y)}V${px(low + 4)}`} />
+          </g>`,
+      )
+    }
+    <${Ball} x=${x + at} y=${y} radius=${damper.radius} />
+    ${
+      force !== 0 &&
+      html`<${Force} x=${x + at} y=${y} length=${-force} />
+        <${Force} x=${force > 0 ? end : start} y=${y} length=${force} />`
+    }
+    ${
+      !isCompact &&
+      html`<${Dimension}
+          from=${x + ends[0].meet}
+          to=${x + ends[1].meet}
+          y=${low + 8}
+          up=${4}
+          name="clearance"
+        />
+        <${Text} x=${middle} y=${low + 22} name="bold">${damper.dimension}<//>`
+    }
   </g>`;
 }
 
-const columnEnds = (wide) => [-wide / 2 + 6, wide / 2 - 6];
-
-function Storey({ storey, picture, cavities }) {
-  const { index, top, height, slab, mass, start } = storey;
-  const { kind, wide, middle, scale, hasGhosts, count } = picture;
-  const isMass = kind === "mass";
-  const slabTop = top + height - slab;
-  const left = middle - wide / 2;
-  const shape = (className, x) =>
-    html`<rect
-      class=${className}
-      x=${pixel(x)}
-      y=${slabTop}
-      width=${pixel(wide)}
-      height=${slab}
-      rx=${isMass ? 4 : 2}
-    />`;
-  return html`${hasGhosts && start !== 0 && shape("ghost", left + start * scale)}
-    <g data-storey=${index}>
-      ${shape("mass", left)}
-      ${
-        isMass &&
-        html`<circle class="roller" cx=${pixel(left + 16)} cy=${storey.foot - 4.5} r="4.5" />
-          <circle class="roller" cx=${pixel(left + wide - 16)} cy=${storey.foot - 4.5} r="4.5" />`
-      }
-      <g transform=${shifted(middle)}>
-        ${cavities.map((cavity) => html`<${Cavity} cavity=${cavity} isHousing=${!isMass} />`)}
-      </g>
-      ${isMass && html`<text x=${pixel(left)} y=${top - 6} class="left">${quantity(mass, "kg")}</text>`}
-    </g>
-    ${
-      !isMass &&
-      html`<text x="0" y=${slabTop + 2} class="left"
-          >${count > 1 ? `storey ${index + 1}` : "structure"}</text
-        >
-        <text x="0" y=${slabTop + 15} class="left quiet">${quantity(mass, "kg")}</text>`
-    }`;
+function Slab({ slab, layout, x, state, peak }) {
+  const { y, tall, cavities } = slab;
+  const { wide } = layout;
+  return html`<g>
+    <${Block} x=${x - wide / 2} y=${y} width=${wide} height=${tall} name="mass" rx="4" />
+    ${cavities.map((cavity) => {
+      const { damper } = cavity;
+      const force = state.forces?.[damper.index] ?? 0;
+      return html`<${Cavity}
+        cavity=${cavity}
+        layout=${layout}
+        x=${x}
+        place=${state.positions?.[damper.index] ?? damper.place}
+        force=${peak > 0 ? (FORCE * force) / peak : 0}
+      />`;
+    })}
+  </g>`;
 }
 
-function groundText({ base, isCut }) {
-  if (isCut) return "more storeys below";
-  return base ? `⟵ ${base} ⟶` : "base at rest";
+// What holds one mass: a wall, a spring and a dashpot side by side, and wheels on the ground.
+function Suspension({ slab, model, layout, x }) {
+  const { wall, wide, middle, ground, isCompact, width } = layout;
+  const { y, tall, storey } = slab;
+  const from = wall;
+  const to = x - wide / 2;
+  const rest = middle - wide / 2 - from;
+  const [upper, lower] = [y + tall * 0.3, y + tall * 0.74].map(Math.round);
+  const label = from + rest / 2;
+  return html`<g>
+    <${Hatched} x=${0} y=${y - 6} width=${wall} height=${ground - y + 6} face="right" />
+    <${Hatched} x=${0} y=${ground} width=${width} height=${wall - 4} face="top" />
+    <${Spring} from=${from} to=${to} y=${upper} />
+    ${model.damping && html`<${Dashpot} from=${from} to=${to} rest=${rest} y=${lower} />`}
+    ${
+      !isCompact &&
+      html`<${Text} x=${label} y=${upper - 13} name="quiet">${quantity(storey.stiffness, "N/m")}<//>
+        ${model.damping && html`<${Text} x=${label} y=${lower + 21} name="quiet">${model.damping}<//>`}`
+    }
+    ${[-0.32, 0.32].map((part) => html`<circle class="wheel" cx=${px(x + part * wide)} cy=${ground - 4.5} r="4.5" />`)}
+  </g>`;
 }
 
-// What stands still: ground, wall, labels, the bar of the scale.
-function Surroundings({ picture }) {
-  const { kind, width, ground, base, start, bar, storeys, middle, wide, scale, isCut } = picture;
-  const isMass = kind === "mass";
-  const [first] = storeys;
-  const from = isMass ? WALL : pixel(middle - wide / 2 - picture.far - 10);
-  const to = isMass ? width - 4 : pixel(middle + wide / 2 + picture.far + 10);
-  const top = first.top + 4;
-  const startX = middle + first.start * scale + (isMass ? wide / 2 : 0);
-  return html`${
-      isMass &&
-      html`<path class="hatching" d=${hatching(WALL, top, WALL, ground, -7, 7)} />
-        <path class="ground" d=${`M${WALL} ${top}V${ground}`} />
-        ${first.stiffness !== null && html`<text x=${WALL + 6} y=${first.top + first.height * 0.28 - 13} class="left quiet">${quantity(first.stiffness, "N/m")}</text>`}`
-    }
+function Columns({ slabs, model, layout, xOf }) {
+  const { legs } = layout;
+  const name = model.kind === "chain" ? "column" : "coupling";
+  return slabs.map(({ storey, y, tall, foot }) => {
+    const [here, below] = [xOf(storey.index), xOf(storey.index - 1)];
+    const d = [-legs, legs].map((leg) => columnPath(here + leg, y + tall, below + leg, foot));
+    return html`<path class=${name} d=${d.join("")} />`;
+  });
+}
+
+function StoreyLabels({ slab, model, layout }) {
+  const { storey, y, tall, foot } = slab;
+  const { isCompact } = layout;
+  const half = y + tall / 2;
+  if (isCompact)
+    return html`<${Text} x=${4} y=${half + 4} name="quiet left">${storey.index + 1}<//>`;
+  return html`<${Text} x=${2} y=${half - 2} name="left"
+      >${model.count > 1 ? `storey ${storey.index + 1}` : "structure"}<//
+    >
+    <${Text} x=${2} y=${half + 13} name="quiet left">${quantity(storey.mass, "kg")}<//>
+    ${model.kind === "chain" && html`<${Text} x=${2} y=${(y + tall + foot) / 2 + 4} name="quiet left">${quantity(storey.stiffness, "N/m")}<//>`}`;
+}
+
+// Where the structure starts: dashed, with the way there as a dimension.
+function Start({ model, layout }) {
+  const { middle, scale, wide, slabs, top, isCompact } = layout;
+  const { start, isSingle } = model;
+  const [first] = slabs;
+  return html`<g class="start">
+    ${slabs.map(
+      ({ storey, y, tall }) =>
+        storey.start !== 0 &&
+        html`<${Block}
+          x=${middle + storey.start * scale - wide / 2}
+          y=${y}
+          width=${wide}
+          height=${tall}
+          name="ghost"
+          rx="4"
+        />`,
+    )}
     ${
-      isCut
-        ? html`<path class="cut" d=${`M${from} ${ground}H${to}`} />`
-        : html`<path class="hatching" d=${hatching(from + 6, ground, to, ground, -7, 7)} />
-            <path class="ground" d=${`M${from} ${ground}H${to}`} />`
-    }
-    <text x=${to} y=${ground + 22} class=${base ? "right base" : "right quiet"}>
-      ${groundText(picture)}
-    </text>
-    ${start && html`<text x=${pixel(startX)} y=${first.top - 6} class=${isMass ? "right" : null}>${start}</text>`}
-    ${
-      scale > 0 &&
-      html`<path
-          class="bar"
-          d=${`M${isMass ? WALL : 2} ${ground + 15}v6h${pixel(bar.length)}v-6`}
+      !isCompact &&
+      start !== 0 &&
+      html`<${Dimension}
+          from=${middle}
+          to=${middle + start * scale}
+          y=${20}
+          up=${6}
+          down=${top - 22}
+          name="release"
         />
-        <text x=${pixel((isMass ? WALL : 2) + bar.length + 6)} y=${ground + 23} class="left"
-          >${bar.label}</text
+        <${Text} x=${middle + (start * scale) / 2} y=${12} name="bold"
+          >${`starts at ${quantity(start, "m")}`}<//
         >`
-    }`;
-}
-
-// The parts of an SVG that poses change.
-function partsOf(svg, picture, cavities) {
-  const find = (root, selector) => root.querySelector(selector);
-  return {
-    spring: find(svg, "[data-part=spring]"),
-    piston: find(svg, "[data-part=piston]"),
-    columns: [...svg.querySelectorAll("[data-part=columns]")],
-    storeys: picture.storeys.map(({ index }) => find(svg, `[data-storey="${index}"]`)),
-    dampers: cavities.flat().map((cavity) => {
-      const group = find(svg, `[data-damper="${cavity.index}"]`);
-      return {
-        cavity,
-        free: find(group, "[data-part=free]"),
-        force: find(group, "[data-part=force]"),
-        pads: [0, 1].map((at) => find(group, `[data-part=pad-${at}]`)),
-        trail: [...group.querySelectorAll("[data-part=trail]")],
-      };
-    }),
-  };
-}
-
-function springEnds(picture) {
-  const [{ top, height }] = picture.storeys;
-  const length = picture.middle - picture.wide / 2 - WALL;
-  const cylinder = limit(2 * picture.far + 12, 22, length - 30);
-  return {
-    springY: pixel(top + height * 0.28),
-    dashpotY: pixel(top + height * 0.72),
-    cylinder: { start: WALL + pixel((length - cylinder) / 2), length: pixel(cylinder) },
-    massLeft: (x) => picture.middle - picture.wide / 2 + x,
-  };
-}
-
-function poseDamper({ cavity, free, force, pads, trail }, scale, place, past, strength) {
-  const at = place * scale;
-  free.setAttribute("transform", shifted(at));
-  pads.forEach((pad, index) => {
-    const { side, wall, thickness } = cavity.ends[index];
-    const depth = side * (at - cavity.middle) - cavity.half;
-    const squeeze = limit(1 - depth / thickness, 0.12, 1);
-    pad.setAttribute("transform", `translate(${pixel(wall)} 0) scale(${pixel(-side * squeeze)} 1)`);
-    pad.classList.toggle("hit", depth > 0.01);
-  });
-  trail.forEach((ghost, index) => {
-    const was = past?.[index];
-    ghost.setAttribute("visibility", was === undefined ? "hidden" : "visible");
-    if (was !== undefined) ghost.setAttribute("transform", shifted(was * scale));
-  });
-  // Of the buffer on the free mass, from the pad into the cavity.
-  const length = limit(Math.abs(strength ?? 0), 0, 1) * LONGEST_ARROW;
-  force.setAttribute("visibility", length > 1.5 ? "visible" : "hidden");
-  if (length <= 1.5) return;
-  const sign = at > cavity.middle ? -1 : 1;
-  const tip = at + sign * (length + 8);
-  const head = sign * Math.min(8, length);
-  force.setAttribute(
-    "d",
-    `M${pixel(at)} ${cavity.y}H${pixel(tip)}m${pixel(-head)} -5l${pixel(head)} 5l${pixel(-head)} 5`,
-  );
-}
-
-// pose({displacements, positions, trails, strengths}): of storeys (m), of free masses in theirs (m), where these were before
-// (the earliest first), and their contact forces as parts of the largest; each by its index.
-function makePose(svg, picture, cavities) {
-  const parts = partsOf(svg, picture, cavities);
-  const ends = picture.kind === "mass" ? springEnds(picture) : null;
-  return ({ displacements = [], positions = [], trails = [], strengths = [] }) => {
-    const shift = (index) => (displacements[index] ?? 0) * picture.scale;
-    parts.storeys.forEach((group, at) =>
-      group.setAttribute("transform", shifted(shift(picture.storeys[at].index))),
-    );
-    if (ends) {
-      const x = ends.massLeft(shift(0));
-      parts.spring?.setAttribute("d", springPath(WALL, x, ends.springY));
-      parts.piston?.setAttribute("d", dashpotPath(WALL, x, ends.dashpotY, ends.cylinder).piston);
     }
-    parts.columns.forEach((columns, at) => {
-      const { index, top, height, foot } = picture.storeys[at];
-      const below = index > 0 ? shift(index - 1) : 0;
-      const paths = columnEnds(picture.wide).map((end) =>
-        columnPath(
-          top + height,
-          foot,
-          picture.middle + end + shift(index),
-          picture.middle + end + below,
-        ),
-      );
-      columns.setAttribute("d", paths.join(""));
-    });
-    for (const damper of parts.dampers) {
-      const { index, place } = damper.cavity;
-      poseDamper(damper, picture.scale, positions[index] ?? place, trails[index], strengths[index]);
-    }
-  };
+    ${isSingle && !isCompact && html`<${Text} x=${middle - wide / 2 + 4} y=${first.y - 7} name="left">${quantity(first.storey.mass, "kg")}<//>`}
+  </g>`;
 }
 
-// The width of an element, followed while it changes.
-function useWidth(box) {
+function Foot({ model, layout }) {
+  const { ground, wall, width, scale, middle, isCompact } = layout;
+  const y = ground + wall + 18;
+  const bar = scale > 0 ? roundDown(84 / scale, [5, 2, 1]) : 0;
+  if (isCompact) return model.base && html`<${Shaking} x=${width - 30} y=${ground + 6} />`;
+  return html`<g>
+    ${model.base && html`<${Shaking} x=${middle} y=${ground + wall + 8} /><${Text} x=${middle} y=${y + 10} name="quiet">${model.base}<//>`}
+    ${
+      bar > 0 &&
+      html`<path class="bar" d=${`M${4} ${y + 2}v7h${px(bar * scale)}v-7`} />
+        <${Text} x=${10 + bar * scale} y=${y + 10} name="quiet left bar-text"
+          >${quantity(bar, "m")}<//
+        >`
+    }
+  </g>`;
+}
+
+// The picture itself. `state` is {displacements of storeys, positions of free masses in theirs, forces on the structure} by
+// index; without it what is at rest, the start dashed. `peak` is the largest force, `trail` the past of the motion.
+export function Picture({ model, layout, state = {}, peak = 0, trail, svgRef }) {
+  const { width, height, middle, scale, slabs, ground, wall } = layout;
+  const { isSingle } = model;
+  const xOf = (index) => middle + (state.displacements?.[index] ?? 0) * scale;
+  return html`<svg
+    ref=${svgRef}
+    viewBox=${`0 0 ${width} ${px(height)}`}
+    width=${width}
+    height=${px(height)}
+    role="img"
+    aria-label=${model.sentence}
+  >
+    ${!state.displacements && html`<${Start} model=${model} layout=${layout} />`}
+    ${trail && html`<${Trail} trail=${trail} model=${model} layout=${layout} />`}
+    ${
+      isSingle
+        ? html`<${Suspension} slab=${slabs[0]} model=${model} layout=${layout} x=${xOf(0)} />`
+        : html`<${Hatched}
+            x=${layout.left - 8}
+            y=${ground}
+            width=${width - layout.left + 8}
+            height=${wall - 4}
+            face="top"
+          />`
+    }
+    ${!isSingle && html`<${Columns} slabs=${slabs} model=${model} layout=${layout} xOf=${xOf} />`}
+    ${slabs.map((slab) => html`<${Slab} key=${slab.storey.index} slab=${slab} layout=${layout} x=${xOf(slab.storey.index)} state=${state} peak=${peak} />`)}
+    ${!isSingle && slabs.map((slab) => html`<${StoreyLabels} slab=${slab} model=${model} layout=${layout} />`)}
+    <${Foot} model=${model} layout=${layout} />
+  </svg>`;
+}
+
+// The pixels that an element has for a drawing.
+export function useRoom(ref, least = 250, most = 720) {
   const [width, setWidth] = useState(0);
   useLayoutEffect(() => {
-    const measure = () => setWidth(Math.round(limit(box.current.clientWidth || 640, 240, 720)));
+    const measure = () => setWidth(Math.round(limit(ref.current?.clientWidth ?? 0, least, most)));
     measure();
     const observer = new ResizeObserver(measure);
-    observer.observe(box.current);
+    observer.observe(ref.current);
     return () => observer.disconnect();
   }, []);
   return width;
 }
 
-// `poser` is a ref: its `current` is the pose function above once the picture is there. `pose` is where it begins. `children`
-// makes what lies on top: children(picture).
-export function Drawing({ scene, plan, stroke, pose, poser, children }) {
+// The drawing of a scene at rest, as wide as there is room.
+export function Drawing({ scene, plan }) {
   const box = useRef(null);
-  const svg = useRef(null);
-  const width = useWidth(box);
-  const picture = useMemo(
-    () => (width > 0 ? layout(scene, { plan, stroke }, width) : null),
-    [scene, plan, stroke, width],
-  );
-  const cavities = picture?.storeys.map(({ dampers }) =>
-    dampers.map((damper) => cavityOf(damper, picture.scale)),
-  );
-  const last = useRef({});
-  useLayoutEffect(() => {
-    if (!picture) return;
-    const set = makePose(svg.current, picture, cavities);
-    const keep = (state) => {
-      last.current = state;
-      set(state);
-    };
-    keep(pose ?? last.current);
-    if (poser) poser.current = keep;
-  }, [picture]);
+  const width = useRoom(box);
+  const model = modelOf(scene, plan);
+  const layout = width > 0 && layoutOf(model, { width });
   return html`<div class="drawing" ref=${box}>
-    ${
-      picture &&
-      html`<svg
-          ref=${svg}
-          viewBox=${`0 0 ${width} ${pixel(picture.height)}`}
-          width=${width}
-          height=${pixel(picture.height)}
-          role="img"
-          aria-label=${picture.label}
-        >
-          <${Surroundings} picture=${picture} />
-          ${picture.kind === "mass" && html`<${SpringAndDashpot} picture=${picture} />`}
-          ${
-            picture.kind === "frame" &&
-            picture.hasColumns &&
-            picture.storeys.map(
-              ({ index, foot, top, height, stiffness }) =>
-                html`<path class="column" data-part="columns" key=${index} />
-                  <text x="0" y=${pixel((top + height + foot) / 2 + 6)} class="left quiet">
-                    ${quantity(stiffness, "N/m")}
-                  </text>`,
-            )
-          }
-          ${picture.storeys.map(
-            (storey, at) =>
-              html`<${Storey}
-                key=${storey.index}
-                storey=${storey}
-                picture=${picture}
-                cavities=${cavities[at]}
-              />`,
-          )}
-          ${children?.(picture)}
-        </svg>
-        ${picture.hidden > 0 && html`<p class="hint">${`${picture.hidden} storeys and dampers are not drawn.`}</p>`}`
-    }
+    ${layout && html`<${Picture} model=${model} layout=${layout} />`}
+    <p class="hint">
+      To scale; twice the free mass, twice its area; a longer contact, a thicker
+      pad.${model.isCut ? ` At most ${MOST} storeys and dampers are drawn.` : ""}
+    </p>
   </div>`;
 }
 
-function SpringAndDashpot({ picture }) {
-  const { springY, dashpotY, cylinder, massLeft } = springEnds(picture);
-  const { damping, storeys } = picture;
-  return html`${storeys[0].stiffness !== 0 && html`<path class="spring" data-part="spring" d=${springPath(WALL, massLeft(0), springY)} />`}
-  ${
-    damping &&
-    html`<path class="spring" d=${dashpotPath(WALL, massLeft(0), dashpotY, cylinder).cylinder} />
-      <path class="spring" data-part="piston" />
-      <text x=${WALL + 6} y=${dashpotY + 21} class="left quiet">${damping}</text>`
-  }`;
-}
+// The same in an element: show(scene, {plan}).
+export const drawing = (host) => ({
+  show: (scene, { plan } = {}) => render(html`<${Drawing} scene=${scene} plan=${plan} />`, host),
+});
