@@ -165,7 +165,24 @@ function usePlayer({ query, ledger, change, classic }, window, pace, isLooped, i
     setIsPlaying(false);
     seek(wanted);
   };
-  return { t, isPlaying, play, scrub, note };
+  // To the next contact or the one before: one step after the other.
+  const queue = useRef(Promise.resolve());
+  const step = (side) => {
+    queue.current = queue.current.then(async () => {
+      const row = await neighbour(ledger, now.current, side).catch(() => null);
+      if (!row || classic.signal.aborted) return;
+      const { from, to } = latest.current.window;
+      const isAway = row.start < from || row.start > to;
+      pending.current = null;
+      setIsPlaying(false);
+      now.current = row.start;
+      noted.current = row.start;
+      setT(row.start);
+      const all = isAway ? { from: null, to: null } : {};
+      change({ impact: row.number, t: row.start, ...all }, true);
+    });
+  };
+  return { t, isPlaying, play, scrub, note, step };
 }
 
 // The number of the contact that begins next after t, or last before it.
@@ -222,17 +239,11 @@ export function Animation() {
     const text = `t = ${time.toFixed(4)} s, ${paceText(pace)}`;
     return held && { state: held, trail: hasTrail ? motion.trailAt(time, pace) : null, text };
   };
-  const step = async (side) => {
-    const row = await neighbour(ledger, t, side).catch(() => null);
-    if (!row) return;
-    if (isPlaying) player.play(false);
-    change({ impact: row.number, t: row.start }, true);
-  };
   const handleKey = (event) => {
     const actions = {
       " ": () => player.play(!isPlaying),
-      n: () => step(1),
-      p: () => step(-1),
+      n: () => player.step(1),
+      p: () => player.step(-1),
     };
     if (event.target.matches("select, button") && event.key === " ") return;
     if (!actions[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -272,8 +283,8 @@ export function Animation() {
         </button>
         ${
           hasImpacts &&
-          html`<${IconButton} label="Impact before (p)" onClick=${() => step(-1)}>❘◀<//>
-            <${IconButton} label="Impact after (n)" onClick=${() => step(1)}>▶❘<//>`
+          html`<${IconButton} label="Impact before (p)" onClick=${() => player.step(-1)}>❘◀<//>
+            <${IconButton} label="Impact after (n)" onClick=${() => player.step(1)}>▶❘<//>`
         }
         <${IconButton} label="Loop" pressed=${isLooped} onClick=${() => setIsLooped(!isLooped)}
           >Loop<//
