@@ -1,9 +1,10 @@
 // The scene as it is edited: sliders, the preview that follows, undo and redo.
 import assert from "node:assert/strict";
-import { hold, says, test, until } from "./support.mjs";
+import { hold, says, tabTo, test, until } from "./support.mjs";
 
 const live = (page) => page.getByRole("region", { name: "Live", exact: true });
 const slider = (page, name) => live(page).getByRole("slider", { name });
+const handle = (page, name) => page.getByRole("group", { name: "Handles of the drawing" }).getByRole("slider", { name });
 const clearance = (page) => page.getByRole("textbox", { name: "Clearance" }).first();
 
 test("A slider runs the scene as it moves; undo and redo take steps back and forth", async ({ page, url }) => {
@@ -37,6 +38,55 @@ test("One preview is on its way at a time, and the newest scene wins", async ({ 
   const wanted = /Free mass\s+([\d.]+) kg/.exec(await live(page).innerText())?.[1];
   assert.ok(Number(wanted) > 0.12, wanted);
   await until("the newest", async () => sent === 2 && /rms −(?!30\.8)/.test(await live(page).innerText()));
+});
+
+// Drags a handle of the drawing by so many pixels.
+async function drag(page, name, dx, dy) {
+  const { x, y, width, height } = await handle(page, name).boundingBox();
+  await page.mouse.move(x + width / 2, y + height / 2);
+  await page.mouse.down();
+  for (let step = 1; step <= 8; step++) {
+    await page.mouse.move(x + width / 2 + (dx * step) / 8, y + height / 2 + (dy * step) / 8);
+    await page.waitForTimeout(150); // longer in all than the pause that parts two steps
+  }
+  await page.mouse.up();
+}
+
+test("What is dragged in the drawing changes the scene, runs it, and is one step to undo", async ({ page, url }) => {
+  await page.goto(url("#/scene"));
+  await says(live(page), /22 impacts/);
+  const undo = live(page).getByRole("button", { name: "Undo" });
+  const scene = () => page.evaluate(() => JSON.parse(document.querySelector("textarea.code").value));
+  await drag(page, "Clearance", 30, 0);
+  const wider = (await scene()).dampers[0].clearance;
+  assert.ok(wider > 0.018 && wider < 0.04, `${wider} m`);
+  await until("the field to follow", async () => Number(await clearance(page).inputValue()) === wider);
+  await says(live(page), /rms −(?!30\.8)/);
+  assert.match(await handle(page, "Clearance").getAttribute("aria-valuetext"), / mm$/);
+  await undo.click();
+  await until("the clearance of before", async () => (await scene()).dampers[0].clearance === 0.015);
+  assert.ok(await undo.isDisabled(), "one drag is one step");
+  await drag(page, "Free mass", 8, -8);
+  assert.ok((await scene()).dampers[0].mass > 0.2, "the mass");
+  await drag(page, "Restitution", 20, -32);
+  const { buffer } = (await scene()).dampers[0];
+  assert.ok(Math.abs(buffer.restitution - 0.81) < 0.03 && buffer.contact_time > 0.03, JSON.stringify(buffer));
+  await drag(page, "Start", -30, 0);
+  assert.ok((await scene()).excitation.displacement < 0.012, "the start");
+  for (let step = 0; step < 3; step++) await undo.click();
+  await until("all of it to be undone", async () => (await scene()).dampers[0].buffer === "sponge" && await undo.isDisabled());
+});
+
+test("The handles are moved by arrow keys; a shaken base has one too", async ({ page, url }) => {
+  await page.goto(url("#/scene?example=paper_sine_sponge"));
+  const base = handle(page, "Base amplitude");
+  await tabTo(page, base);
+  const before = await base.getAttribute("aria-valuetext");
+  await page.keyboard.press("ArrowRight");
+  await until("another amplitude", async () => (await base.getAttribute("aria-valuetext")) !== before);
+  await tabTo(page, handle(page, "Restitution"));
+  await page.keyboard.press("ArrowUp");
+  await until("e", async () => /^e 0\.63, contact time 25 ms$/.test(await handle(page, "Restitution").getAttribute("aria-valuetext")));
 });
 
 test("A run that is too long for a preview says so; a frame of the live view is quick", async ({ page, url }) => {

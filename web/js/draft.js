@@ -12,7 +12,7 @@ function put(holder, [name, ...deeper], value) {
   delete holder[name];
 }
 
-// A listener gets {pointer} after a change ("" is all of it), {check} after a dry run's answer or the service's faults.
+// A listener gets {pointer, isMoving} after a change ("" is all of it), {check} after a dry run's answer or the service's faults.
 export function makeDraft(scene, signal = null) {
   const listeners = new Set();
   const news = (what) => [...listeners].forEach((listener) => listener(what));
@@ -23,6 +23,11 @@ export function makeDraft(scene, signal = null) {
     set(pointer, value) {
       put(draft.scene, parts(pointer), value);
       news({ pointer });
+    },
+    // A change of many that follow each other, as of what is dragged.
+    move(pointer, value) {
+      put(draft.scene, parts(pointer), value);
+      news({ pointer, isMoving: true });
     },
     replace(next) {
       draft.scene = next;

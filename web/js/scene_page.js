@@ -11,7 +11,7 @@ import { bufferWidget } from "./picker.js";
 import { recordWidget } from "./record_widget.js";
 import { sceneForm } from "./scene_form.js";
 import { keep, open, sponge } from "./scene_state.js";
-import { drawing } from "./scene/drawing.js";
+import { drawing } from "./scene/editor.js";
 import { makeHistory } from "./scene/history.js";
 import { showLive } from "./scene/live.js";
 
@@ -48,7 +48,7 @@ async function show(host, address, signal) {
       panel("Estimate", state, comes))));
   const past = makeHistory(draft);
   showLive(live, draft, past, signal);
-  const picture = drawing(drawn), draw = () => picture.show(draft.scene, { plan: draft.check?.plan });
+  const picture = drawing(drawn, draft, past), draw = picture.show;
   draw();
 
   let timer, turn = 0, isEdited = false, isUnkept = false, loading;
@@ -132,7 +132,7 @@ async function show(host, address, signal) {
   }).catch(faults(steps));
   return {
     change: ({ query }) => load(query),
-    leave: () => clearTimeout(timer),
+    leave: () => (clearTimeout(timer), picture.leave()),
   };
 }
 

@@ -1,9 +1,9 @@
 // A scene as a picture in a state of motion: one mass on its spring and dashpot, or storeys on columns, each with its free
 // masses between their stops.
-import { html, render, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { html, useLayoutEffect, useState } from "../ui/preact.js";
 import { quantity } from "../units.js";
 import { layoutOf, roundDown } from "./layout.js";
-import { limit, modelOf, MOST } from "./model.js";
+import { limit } from "./model.js";
 import {
   Ball,
   columnPath,
@@ -269,23 +269,3 @@ export function useRoom(ref, least = 250, most = 720) {
   }, []);
   return width;
 }
-
-// The drawing of a scene at rest, as wide as there is room.
-export function Drawing({ scene, plan }) {
-  const box = useRef(null);
-  const width = useRoom(box);
-  const model = modelOf(scene, plan);
-  const layout = width > 0 && layoutOf(model, { width });
-  return html`<div class="drawing" ref=${box}>
-    ${layout && html`<${Picture} model=${model} layout=${layout} />`}
-    <p class="hint">
-      To scale; twice the free mass, twice its area; a longer contact, a thicker
-      pad.${model.isCut ? ` At most ${MOST} storeys and dampers are drawn.` : ""}
-    </p>
-  </div>`;
-}
-
-// The same in an element: show(scene, {plan}).
-export const drawing = (host) => ({
-  show: (scene, { plan } = {}) => render(html`<${Drawing} scene=${scene} plan=${plan} />`, host),
-});

@@ -8,6 +8,7 @@ export function makeHistory(draft) {
   let present = JSON.stringify(draft.scene);
   let last = -Infinity;
   let isMoving = false;
+  let isHeld = false;
   const listeners = new Set();
   const notify = () => listeners.forEach((listener) => listener());
   draft.onChange(({ pointer }) => {
@@ -16,7 +17,7 @@ export function makeHistory(draft) {
     if (next === present) return;
     const now = performance.now();
     if (now - last > PAUSE) past = [...past, present].slice(-MOST);
-    last = now;
+    last = isHeld ? Infinity : now;
     present = next;
     future = [];
     notify();
@@ -39,6 +40,11 @@ export function makeHistory(draft) {
     },
     get canRedo() {
       return future.length > 0;
+    },
+    // While it is held all changes are one step, however long it takes.
+    hold(on) {
+      isHeld = on;
+      last = -Infinity;
     },
     // What is there now is where it begins: the scene was loaded.
     restart() {

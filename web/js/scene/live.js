@@ -44,7 +44,7 @@ function slidersOf({ dampers, excitation }) {
 }
 
 // A slider in equal ratios about the value that was there when it was last changed elsewhere.
-function Slider({ slider, draft, onMove }) {
+function Slider({ slider, draft }) {
   const { label, pointer, unit, most = Infinity } = slider;
   const value = draft.get(pointer);
   const center = useRef(value);
@@ -58,8 +58,7 @@ function Slider({ slider, draft, onMove }) {
       (center.current * SPAN ** (event.currentTarget.value / STEPS)).toPrecision(4),
     );
     own.current = Math.min(next, most);
-    draft.set(pointer, own.current);
-    onMove();
+    draft.move(pointer, own.current);
   };
   return html`<div class="live-slider">
     <span>${label}</span>
@@ -127,9 +126,10 @@ function Live({ draft, history, signal }) {
       bareAsked = next;
       barePreview.ask(next.scene);
     };
-    // What is typed is run once the service has found no fault in it; what a slider sets, at once.
-    const follow = ({ check }) => {
+    // What is typed is run once the service has found no fault in it; what a slider or a handle sets, at once.
+    const follow = ({ check, isMoving }) => {
       redraw();
+      if (isMoving) ask.current();
       if (!check) return;
       if (check.cost.cpu_seconds <= MOST_COST) ask.current();
       else setAnswer({ channels: [], damper: null, data: null, error: new Error(TOO_LONG) });
@@ -171,7 +171,7 @@ function Live({ draft, history, signal }) {
       </div>
     </div>
     <div class="live-sliders">
-      ${slidersOf(draft.scene).map((slider) => html`<${Slider} key=${slider.pointer} slider=${slider} draft=${draft} onMove=${() => ask.current()} />`)}
+      ${slidersOf(draft.scene).map((slider) => html`<${Slider} key=${slider.pointer} slider=${slider} draft=${draft} />`)}
     </div>
     ${error && html`<p class="hint">${error.status === 422 ? TOO_LONG : error.message}</p>`}
     ${

@@ -33,8 +33,8 @@ function dampingText({ damping, damping_ratio: ratio }) {
 
 // A stop: its name, how soft it looks from 0 to 1, and so how thick, by the time of a contact.
 function stopOf(buffer, derived) {
-  const time = derived ? (derived.contact_time ?? 0) : (buffer?.contact_time ?? 0.02);
-  const softness = limit(Math.log10(real(time) / 0.0003) / 2, 0, 1) || 0;
+  const own = buffer?.contact_time ?? (derived ? (derived.contact_time ?? 0) : 0.02);
+  const softness = limit(Math.log10(real(own) / 0.0003) / 2, 0, 1) || 0;
   const restitution = buffer?.restitution ?? derived?.restitution;
   const material = buffer?.material ?? (typeof buffer === "string" ? buffer : null);
   const name = material ? words(material).split("@")[0] : `e ${number(restitution, 3)}`;
