@@ -4,8 +4,8 @@
 #include "server/http/router.h"
 
 static const char *const of_submit[] = {"dry_run", NULL};
-static const char *const of_jobs[] = {"limit",  "before", "status", "q",     "label",
-                                      "result", "kind",   "since",  "until", "details", NULL};
+static const char *const of_jobs[] = {"limit", "before", "status", "q",       "label", "result",
+                                      "kind",  "since",  "until",  "details", NULL};
 static const char *const of_job[] = {"wait", NULL};
 static const char *const of_dismissal[] = {"purge", NULL};
 static const char *const of_series[] = {"channels", "from", "to", "points", NULL};

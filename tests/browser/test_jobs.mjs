@@ -27,7 +27,7 @@ test("A long sweep shows how far it is and its rows, and a click cancels it", as
   await says(page.getByRole("heading", { level: 1 }), /./);
 });
 
-test("Runs are found by title, state and study, by a URL too, and one is cancelled by keyboard", async ({ page, daemon, url, newPage }) => {
+test("Runs are found by words, state and study, by a URL too, and one is cancelled by keyboard", async ({ page, daemon, url, newPage }) => {
   await daemon.run("paper_free_sponge");
   await daemon.run("compare_sponge");
   const { id } = await submit(daemon, await slow(daemon));
@@ -36,29 +36,81 @@ test("Runs are found by title, state and study, by a URL too, and one is cancell
   await page.getByRole("combobox", { name: "Study" }).selectOption("compare");
   await until("the comparison alone", async () => (await page.getByRole("row").count()) === 2);
   await page.getByRole("combobox", { name: "Study" }).selectOption("");
-  await page.getByLabel("Title or label").fill("slow");
+  await page.getByLabel("Words").fill("slow");
   await leads(page, /q=slow/);
   await until("the slow one alone", async () => (await page.getByRole("row").count()) === 2);
   const other = await newPage();
   await other.goto(page.url());
   await other.getByRole("link", { name: "A slow one" }).waitFor();
   assert.equal(await other.getByRole("row").count(), 2);
+  await says(page.getByRole("row", { name: /A slow one/ }), /Running[^]*%/);
   await tabTo(page, page.getByRole("button", { name: "Cancel A slow one" }));
   await page.keyboard.press("Enter");
-  await page.getByRole("cell", { name: "Cancelled" }).waitFor();
+  await page.getByRole("cell", { name: /Cancelled/ }).waitFor();
   assert.equal(await state(daemon, id), "dismissed");
   assert.equal(await page.evaluate(() => document.activeElement.textContent), "A slow one");
 });
 
-test("A page of many runs leads to the older ones and back", async ({ page, daemon, url }) => {
+const cells = (page, at) => page.getByRole("row").evaluateAll((rows, column) =>
+  rows.slice(1).map((row) => row.cells[column].innerText.split("\n")[0]), at);
+
+test("Runs without a title, or with the same one, are named by what differs; inputs and metrics are columns that sort", async ({ page, daemon, url }) => {
+  const { title, ...scene } = await daemon.example("paper_free_sponge");
+  for (const clearance of [0.0101, 0.0303, 0.0202])
+    await daemon.run({ ...scene, dampers: [{ ...scene.dampers[0], clearance }] }, clearance < 0.03 ? { title: "Tuned" } : {});
+  await daemon.run({ ...scene, dampers: [{ ...scene.dampers[0], clearance: 0.0404 }] });
+  await page.goto(url("#/jobs?q=clearance"));
+  await until("four runs with names", async () => (await cells(page, 1)).join() === "Sponge, clearance 40.4 mm,Clearance 20.2 mm,Sponge, clearance 30.3 mm,Clearance 10.1 mm");
+  await says(page.getByRole("row", { name: /20\.2 mm/ }), /Tuned/);
+  const heads = await page.getByRole("columnheader").allInnerTexts();
+  for (const name of [/Clearance \[mm\]/, /Motion, rms \[mm\]/, /Motion, peak \[mm\]/, /Impacts/, /Largest force \[N\]/])
+    assert.ok(heads.some((head) => name.test(head)), `${name} among ${heads}`);
+  const rms = heads.findIndex((head) => head.startsWith("Motion, rms"));
+  await page.getByRole("button", { name: "Motion, rms [mm]" }).click();
+  await leads(page, /sort=rms_displacement/);
+  const rising = (await cells(page, rms)).map(Number);
+  assert.deepEqual(rising, rising.toSorted((a, b) => a - b));
+  await page.getByRole("button", { name: "Motion, rms [mm]" }).click();
+  await leads(page, /sort=-rms_displacement/);
+  await page.reload();
+  await until("the same order by the address", async () => (await cells(page, rms)).map(Number).join() === rising.toReversed().join());
+});
+
+test("Chosen runs are compared, renamed and deleted", async ({ page, daemon, url }) => {
   const scene = await daemon.example("paper_free_sponge");
-  for (let number = 0; number < 25; number++) await daemon.run(scene, { title: `Run ${number}.` });
-  await page.goto(url("#/jobs"));
-  await page.getByRole("link", { name: "Run 24." }).waitFor();
-  await page.getByRole("link", { name: "Older runs" }).click();
-  await page.getByRole("link", { name: "Run 4." }).waitFor();
+  const [first, second] = [await daemon.run(scene, { title: "Mine 1", duration: 3 }), await daemon.run(scene, { title: "Mine 2", duration: 4 })];
+  await page.goto(url("#/jobs?q=mine"));
+  await page.getByRole("checkbox", { name: "Choose Mine 1" }).check();
+  assert.ok(await page.getByRole("button", { name: "Compare" }).isDisabled());
+  await page.getByRole("button", { name: "Rename" }).click();
+  await page.getByLabel("Title").fill("Mine, renamed");
+  await page.keyboard.press("Enter");
+  await page.getByRole("link", { name: "Mine, renamed" }).waitFor();
+  assert.equal((await daemon.get(`/v1/jobs/${first.id}`)).title, "Mine, renamed");
+  await page.getByRole("button", { name: "Choose all" }).click();
+  await page.getByRole("link", { name: "Compare" }).nth(1).click();
+  await leads(page, new RegExp(`compare\\?a=${first.result}&b=${second.result}`));
   await page.goBack();
-  await page.getByRole("link", { name: "Run 24." }).waitFor();
+  await page.getByRole("checkbox", { name: "Choose Mine 2" }).check();
+  await page.getByRole("button", { name: "Delete", exact: true }).click();
+  await page.getByRole("button", { name: "Delete for good" }).click();
+  await until("it to go", async () => (await page.getByRole("row").count()) === 2);
+  const left = (await daemon.get("/v1/jobs?q=mine")).jobs.map(({ id }) => id);
+  assert.deepEqual(left, [first.id]);
+});
+
+test("A page of many runs leads to the older ones and back, and words find older ones by their titles", async ({ page, daemon, url }) => {
+  const scene = await daemon.example("paper_free_sponge");
+  await daemon.run(scene, { title: "The oldest of many" });
+  for (let number = 0; number < 100; number++) await daemon.run(scene, { title: `Run ${number}.`, duration: 1 });
+  await page.goto(url("#/jobs"));
+  await page.getByRole("link", { name: "Run 99." }).waitFor();
+  await page.getByRole("link", { name: "Older runs" }).click();
+  await page.getByRole("link", { name: "The oldest of many" }).waitFor();
+  await page.goBack();
+  await page.getByRole("link", { name: "Run 99." }).waitFor();
+  await page.getByLabel("Words").fill("oldest");
+  await page.getByRole("link", { name: "The oldest of many" }).waitFor();
 });
 
 test("A run that fails says why", async ({ page, daemon, url }) => {

@@ -14,8 +14,8 @@ import { UnitsMenu } from "./ui/units_menu.js";
 // when `signal` is aborted.
 const pages = {
   scene: () => import("./scene_page.js"),
-  jobs: () => import("./jobs_page.js"),
-  job: () => import("./job_page.js"),
+  jobs: () => import("./runs/runs.js"),
+  job: () => import("./runs/run.js"),
   result: () => import("./result/page.js"),
   report: () => import("./result/report.js"),
   compare: () => import("./compare_page.js"),

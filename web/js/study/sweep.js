@@ -1,7 +1,6 @@
 // A sweep: the metric that varies most with its best point, the others small below, and every point a step from its run. In
 // the address: metric, point (an index).
-import { html, render, useMemo } from "../ui/preact.js";
-import { note, read } from "../address.js";
+import { html, useMemo } from "../ui/preact.js";
 import { get, post, submit } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Loaded, Notice } from "../ui/controls.js";
@@ -306,21 +305,4 @@ function Picture(props) {
   >
     ${dots}
   <//>`;
-}
-
-// On the page of a job while it runs.
-export function showSweep(host, more) {
-  const draw = () =>
-    render(
-      html`<${Sweep}
-        query=${read().query}
-        change=${(changes, push) => {
-          note(changes, push);
-          draw();
-        }}
-        ...${more}
-      />`,
-      host,
-    );
-  draw();
 }

@@ -44,7 +44,8 @@ function compare(a, b) {
 
 // A table of `rows`. A column is {label, value(row), unit, digits, cell(row), isNumeric}: `value` is what is sorted and
 // copied; numbers are written in the column's unit, or as `cell` shows them where it returns something. `filter` shows a field whose words rows must
-// contain; `selection` is {chosen: Set of keys, toggle(row)}, with `keyOf(row)`; `chosenKey` marks a row.
+// contain; `selection` is {chosen: Set of keys, toggle(row)}, with `keyOf(row)`; `chosenKey` marks a row. The table keeps its
+// order, {column: index, direction: 1 or -1}, unless `order` and `onOrder` do. `tools` stand above it.
 export function Table({
   caption,
   columns,
@@ -54,9 +55,14 @@ export function Table({
   keyOf,
   chosenKey,
   onRow,
+  order: givenOrder,
+  onOrder,
+  tools,
   empty = "Nothing here yet.",
 }) {
-  const [order, setOrder] = useState({ column: -1, direction: 1 });
+  const [ownOrder, setOwnOrder] = useState({ column: -1, direction: 1 });
+  const order = givenOrder ?? ownOrder;
+  const setOrder = onOrder ?? setOwnOrder;
   const [words, setWords] = useState("");
   const units = useStore(settings);
   const formats = useMemo(
@@ -103,6 +109,7 @@ export function Table({
   };
   return html`<div class="table">
     <div class="table-tools">
+      ${tools}
       ${filter && html`<input type="search" placeholder=${filter} aria-label=${filter} value=${words} onInput=${(event) => setWords(event.currentTarget.value)} />`}
       ${rows.length > 0 && html`<${CopyButton} text=${lines} label="Copy" />`}
     </div>

@@ -1,0 +1,96 @@
+// What is done with the runs that were chosen: compared, renamed, deleted.
+import { link } from "../address.js";
+import { ask } from "../api.js";
+import { announce } from "../ui/announce.js";
+import { Button } from "../ui/controls.js";
+import { html, useEffect, useRef, useState } from "../ui/preact.js";
+import { isOpen } from "./state.js";
+
+const MOST_COMPARED = 4;
+const LETTERS = ["a", "b", "c", "d"];
+
+const count = (number) => (number === 1 ? "1 run" : `${number} runs`);
+const resultsOf = (rows) => [
+  ...new Set(rows.filter((row) => row.result && !row.result_deleted).map((row) => row.result)),
+];
+
+export const comparisonLink = (results) =>
+  link("compare", Object.fromEntries(results.map((id, at) => [LETTERS[at], id])));
+
+function CompareLink({ rows }) {
+  const results = resultsOf(rows);
+  if (results.length >= 2 && results.length <= MOST_COMPARED)
+    return html`<a class="button primary" href=${comparisonLink(results.reverse())}>Compare</a>`;
+  return html`<button
+    type="button"
+    disabled
+    title=${`Choose 2 to ${MOST_COMPARED} runs with results`}
+  >
+    Compare
+  </button>`;
+}
+
+function RenameForm({ row, onDone, onClose }) {
+  const input = useRef(null);
+  const [error, setError] = useState(null);
+  useEffect(() => input.current.select(), []);
+  const save = async (event) => {
+    event.preventDefault();
+    try {
+      await ask("PATCH", `v1/jobs/${row.id}`, { json: { title: input.current.value.trim() } });
+      announce("Renamed");
+      onDone();
+    } catch (problem) {
+      setError(problem);
+    }
+  };
+  return html`<form class="row" onSubmit=${save}>
+    <label>
+      Title
+      <input
+        ref=${input}
+        size="40"
+        maxlength="200"
+        defaultValue=${row.title ?? row.name}
+        aria-invalid=${error !== null || null}
+      />
+    </label>
+    <button class="primary">Save</button>
+    <${Button} isQuiet onClick=${onClose}>Not now<//>
+    ${error && html`<p class="fault" role="alert">${error.message}</p>`}
+  </form>`;
+}
+
+// One after the other; those that cannot be deleted are left, and the first reason is shown.
+async function removeAll(rows) {
+  for (const row of rows) await ask("DELETE", `v1/jobs/${row.id}`, { query: { purge: 1 } });
+  announce(`Deleted: ${count(rows.length)}`);
+}
+
+// The bar is there before something is chosen, so that the table does not move.
+export function Actions({ rows, isAll, onAll, onNone, onDone }) {
+  const [step, setStep] = useState(null); // "rename" or "delete", before it is done
+  const isBusy = rows.some(isOpen);
+  const isNone = rows.length === 0;
+  const end = () => {
+    setStep(null);
+    onDone();
+  };
+  const close = () => setStep(null);
+  if (step === "rename" && rows.length === 1)
+    return html`<${RenameForm} key=${rows[0].id} row=${rows[0]} onDone=${end} onClose=${close} />`;
+  if (step === "delete" && !isNone)
+    return html`<div class="row" role="status">
+      <span>${`Delete ${count(rows.length)} for good, with results that no other run has?`}</span>
+      <${Button} isPrimary onClick=${() => removeAll(rows).finally(end)}>Delete for good<//>
+      <${Button} isQuiet onClick=${close}>Keep<//>
+    </div>`;
+  return html`<div class="row" role="group" aria-label="Chosen runs">
+    <span class="quiet chosen-count">${isNone ? "None chosen" : `${rows.length} chosen`}</span>
+    <${CompareLink} rows=${rows} />
+    <${Button} disabled=${rows.length !== 1} onClick=${() => setStep("rename")}>Rename<//>
+    <${Button} disabled=${isNone || isBusy} onClick=${() => setStep("delete")}>Delete<//>
+    ${!isAll && html`<${Button} isQuiet onClick=${onAll}>Choose all<//>`}
+    ${!isNone && html`<${Button} isQuiet onClick=${onNone}>Choose none<//>`}
+  </div>`;
+}

@@ -1,0 +1,64 @@
+// Names that tell runs apart: their own titles, else what differs in their scenes.
+import { words } from "../units.js";
+import { labelOf, valueText, varyingInputs } from "./scenes.js";
+
+const MOST_PARTS = 3; // of a name
+const capital = (text) => text.replace(/^./, (letter) => letter.toUpperCase());
+
+// "clearance 15 mm"; words speak for themselves: "sponge".
+const partText = ({ label, unit }, value) =>
+  typeof value === "number" ? `${label} ${valueText(value, unit)}` : valueText(value);
+
+function studyText({ kind, axes, variables, parameters }) {
+  const varied = (axes ?? variables ?? parameters ?? [])
+    .flatMap(({ pointer, pointers }) => pointer ?? pointers)
+    .map((pointer) => labelOf(pointer));
+  return varied.length > 0 ? `${kind}: ${varied.join(" and ")}` : kind;
+}
+
+// What a scene is where nothing else tells it: "sponge, free".
+function materialOf(scene) {
+  const [damper] = scene.dampers ?? [];
+  const buffer = damper?.buffer ?? damper?.left_buffer;
+  if (!damper) return "no damper";
+  return buffer?.material ? valueText(buffer.material) : "a damper";
+}
+const plainName = (scene) => `${materialOf(scene)}, ${words(scene.excitation?.kind ?? "free")}`;
+
+// A name for each of {scene, title}: by the inputs that vary among them, else by what they are. Without a title the material
+// comes first.
+function differingNames(jobs, schema) {
+  const scenes = jobs.map(({ scene }) => scene ?? {});
+  const inputs = varyingInputs(scenes, schema);
+  return jobs.map(({ scene, title }, at) => {
+    if (!scene) return null;
+    const parts = inputs
+      .filter(({ values }) => values[at] !== undefined && values[at] !== null)
+      .slice(0, MOST_PARTS)
+      .map((input) => partText(input, input.values[at]));
+    if (!title && parts.length > 0 && !inputs.some(({ label }) => label === "material"))
+      parts.unshift(materialOf(scene));
+    const study = scene.study && studyText(scene.study);
+    if (parts.length === 0 && inputs.length > 0) return study && capital(study);
+    const own = parts.length > 0 ? parts.join(", ") : plainName(scene);
+    return capital(study ? `${study}; ${own}` : own);
+  });
+}
+
+// Map of job id to {name, title}: `title` only where the name is another one. `jobs` are {id, title, scene, result}.
+export function namesOf(jobs, schema) {
+  const names = new Map();
+  const groups = Map.groupBy(jobs, ({ title }) => title ?? "");
+  for (const [title, group] of groups) {
+    const isAlone = title !== "" && new Set(group.map(({ result, id }) => result ?? id)).size === 1;
+    const found = isAlone ? [] : differingNames(group, schema);
+    const isTelling = title === "" || new Set(found).size > 1;
+    group.forEach((job, at) => {
+      const name = isTelling ? found[at] : null;
+      if (name) names.set(job.id, { name, title });
+      else
+        names.set(job.id, { name: title || `A ${job.study ?? "run"} without a title`, title: "" });
+    });
+  }
+  return names;
+}
