@@ -116,40 +116,84 @@ test("The trade of error against cost names what to take, and a way leads into t
   assert.match(await until("a link with the scene", () => page.getByRole("link", { name: "Use it in the scene" }).getAttribute("href").then((href) => /s=/.test(href) && href)), /#\/scene\?s=/);
 });
 
-test("Many seeds: how many were enough, bands of mean and runs, the seed of the largest is in the scene", async ({ page, daemon, url }) => {
+test("Many seeds: the mean with its interval, a histogram or its sum, bands of spectra, the seed of the largest is in the scene", async ({ page, daemon, url }) => {
   const main = await open(page, daemon, url, "ensemble_random_sponge");
+  await says(main, /Mean RMS displacement 3\.819 mm \(95 %: 3\.67 mm to 3\.97 mm\); 90 of 100 runs have 3\.16 mm to 4\.56 mm\. 44 runs\./);
   await says(main, /44 of 200 runs keep the mean of RMS displacement within 0\.05/);
   await says(page.getByRole("figure", { name: "Spectrum of the mean acceleration" }), /one run, by a standard deviation[^]*mean, 95 %/);
+  await says(page.getByRole("figure", { name: "Distribution of the RMS displacement" }), /Number of runs/);
+  await page.getByRole("button", { name: "Cumulative" }).click();
+  await says(page.getByRole("figure", { name: "Distribution of the RMS displacement" }), /Part of the runs at or below/);
+  await page.getByRole("group", { name: "Metric" }).getByRole("button", { name: "Peak contact force" }).click();
+  await leads(page, /metric=peak_contact_force/);
+  await says(main, /Mean peak contact force 5\.631 N/);
   assert.deepEqual(await axe(page), []);
   await page.getByRole("link", { name: "seed 44" }).first().press("Enter");
   await leads(page, /#\/scene/);
 });
 
-test("Errors of the buffers: bands, settled slopes and those that are none, k_b and c_b", async ({ page, daemon, url }) => {
+test("Errors of the buffers: the steepest slope in words and first in a tornado, those that are none, k_b and c_b", async ({ page, daemon, url }) => {
   const main = await open(page, daemon, url, "sensitivity_sponge");
+  await says(main, /The peak contact force depends most on the free mass: 0\.86 % for 1 % more of it/);
   await says(main, /peak contact force from 5\.04 N to 6\.73 N \(stated 5\.72 N\)/);
-  await says(page.getByRole("table", { name: /Slopes/ }), /not settled/);
+  const tornado = page.getByRole("figure", { name: "Slopes of the peak contact force" });
+  assert.match(await tornado.locator("svg").textContent(), /free mass.*contact time.*clearance.*restitution.*\+0\.86 %.*−0\.69 %.*\+0\.66 %.*\+0\.24 %/s);
+  await page.getByRole("button", { name: "RMS acceleration", exact: true }).click();
+  await until("slopes that do not settle", async () => /not settled/.test(await page.getByRole("figure", { name: "Slopes of the RMS acceleration" }).locator("svg").textContent()));
   await says(page.getByRole("table", { name: /stiffness and damping/ }), /1\.656 kN\/m ± 20\.1 %/);
   assert.deepEqual(await axe(page), []);
 });
 
-test("Studies that design: the chart, the values found with units, and the way to the scene that has them", async ({ page, daemon, url }) => {
+test("Optimize: the best values with their gain in words, the front of two objectives, the way to the scene that has them", async ({ page, daemon, url }) => {
   const study = { kind: "optimize", max_candidates: 10, objectives: [{ metric: "rms_displacement" }, { metric: "peak_contact_force" }],
     variables: [{ pointer: "/dampers/0/clearance", from: 0.005, to: 0.03 }, { pointer: "/dampers/0/buffer", values: ["sponge", "aluminium"] }] };
   const job = await daemon.run("paper_free_sponge", { duration: 2, study }), main = page.getByRole("main");
   await page.goto(url(`#/results/${job.result}`));
-  await says(main, /Best: clearance 0\.0\d+, buffer (sponge|aluminium)@1\.\s+10 candidates, 12 runs\./);
+  await says(main, /A good compromise: clearance [\d.]+ mm, buffer (sponge|aluminium)\. RMS displacement [\d.]+ mm, [\d.]+ % (below|above) the given scene/);
+  await says(main, /10 candidates, 12 runs\./);
   await says(page.getByRole("table", { name: "Gain" }), /RMS displacement\s+[\d.]+ mm\s+[\d.]+ mm\s+[\d.]+ mm/);
-  await says(page.getByRole("table", { name: "Best compromises" }), /clearance 0\.0\d+, buffer \w+@1\s+[\d.]+ mm\s+[\d.]+ N/);
-  await until("the chart", () => page.getByRole("img", { name: /^Chart/ }).evaluate((image) => image.naturalWidth > 0));
+  await says(page.getByRole("table", { name: "Best compromises" }), /clearance [\d.]+ mm, buffer \w+\s+[\d.]+\s+[\d.]+/);
+  await page.getByRole("figure", { name: "Best compromises" }).waitFor();
   assert.deepEqual(await axe(page), []);
   await page.getByRole("link", { name: "Run the scene with these values" }).click();
   await leads(page, /#\/scene\?s=/);
-  await open(page, daemon, url, "calibrate_free_sponge");
+});
+
+test("Calibrate: what was found and how well it is known, measured beside fitted, what is left", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "calibrate_free_sponge");
+  await says(main, /Explained: buffer restitution 0\.6098 ± [^,]+, buffer contact time 24\.99 ms ± 29 µs\./);
+  await says(page.getByRole("figure", { name: "Displacement", exact: true }), /measured[^]*fitted/);
+  await page.getByRole("figure", { name: "Displacement, measured less fitted" }).waitFor();
   await says(page.getByRole("table", { name: "Parameters" }), /Buffer contact time\s+24\.99 ms\s+[\d.]+ µs\s+24\.9 ms to 25\.1 ms\s+yes/);
-  await open(page, daemon, url, "response_sponge");
-  await says(page.getByRole("table", { name: "Points" }), /3 Hz\s+up\s+1\s+2\s+yes\s+4\.954 mm\s+3\.498 mm/);
+  await says(page.getByRole("table", { name: "Residuals" }), /Displacement\s+101 µm/);
+  assert.deepEqual(await axe(page), []);
+});
+
+test("Response: the largest motion against that without dampers; stable, unstable and irregular motions", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "response_sponge");
+  await says(main, /The largest displacement is [\d.]+ mm at excitation frequency [\d.]+ Hz, [\d.]+ % below the largest without dampers/);
+  await says(page.getByRole("figure", { name: "Response curve" }), /without dampers[^]*stable[^]*unstable/);
+  await page.getByText("All points as a table").click();
+  await says(page.getByRole("table", { name: "Points" }), /3\.0*\s+up\s+1\s+2\s+yes\s+4\.95\d*\s+3\.49\d*/);
   await open(page, daemon, url, "ensemble_inputs");
-  await says(page.getByRole("table", { name: /Shares of the inputs/ }), /Peak contact force\s+buffer\s+0\.\d+\s+0\.\d+ to 0\.\d+/);
+  const shares = page.getByRole("figure", { name: /variance of the RMS displacement/ });
+  await until("shares", async () => /buffer.*clearance.*66\.7 %/s.test(await shares.locator("svg").textContent()));
+  await page.getByRole("figure", { name: "Fan of the displacement" }).waitFor();
+  assert.deepEqual(await axe(page), []);
+});
+
+test("Fragility: the intensity at which half of the motions exceed a limit, with the records beside the curve", async ({ page, daemon, url }) => {
+  const samples = (seed) => Array.from({ length: 800 }, (_, at) => Math.sin(at * (0.13 + 0.04 * seed)) * Math.exp(-(((at - 400) / 150) ** 2)) + 0.3 * Math.sin(at * 0.71 + seed));
+  for (let seed = 1; seed <= 4; seed++) await daemon.ask("POST", "/v1/records", { name: `quake_${seed}`, interval: 0.01, samples: samples(seed) });
+  const study = { kind: "fragility", records: [1, 2, 3, 4].map((seed) => `quake_${seed}`), levels: { values: [0.5, 1, 2, 3, 4, 6] },
+    limits: [{ metric: "peak_displacement", value: 0.01 }, { metric: "peak_acceleration", value: 4 }] };
+  const job = await daemon.run("paper_free_sponge", { excitation: { kind: "record", name: "quake_1" }, duration: 8, study });
+  const main = page.getByRole("main");
+  await page.goto(url(`#/results/${job.result}`));
+  await says(main, /bring the peak displacement above 10 mm at a peak ground acceleration of [\d.]+ m\/s²|no curve can be fitted/);
+  await page.getByRole("figure", { name: "Fragility" }).waitFor();
+  await page.getByRole("button", { name: "Peak acceleration 4 m/s²" }).click();
+  await leads(page, /limit=1/);
+  await says(page.getByRole("figure", { name: "Peak acceleration of each record" }), /records[^]*16 to 84 %[^]*median/);
   assert.deepEqual(await axe(page), []);
 });

@@ -48,8 +48,11 @@ function valueDomain(y, series, rules, domain) {
   if (y.categories) return [y.categories.length - 0.5, -0.5];
   const arrays = series.flatMap((one) => valuesInView(one, domain));
   arrays.push(rules.filter((rule) => rule.y !== undefined).map((rule) => rule.y));
-  if (y.includeZero || (!y.log && series.some((one) => one.kind === "bars"))) arrays.push([0]);
-  return paddedDomain(extentOf(arrays, y.log), y.log);
+  const isBars = !y.log && series.some((one) => one.kind === "bars");
+  if (y.includeZero || isBars) arrays.push([0]);
+  const extent = extentOf(arrays, y.log);
+  const padded = paddedDomain(extent, y.log);
+  return isBars && extent?.[0] === 0 ? [0, padded[1]] : padded; // bars stand on their axis
 }
 
 // Chart({title, description, x, y, series, …}):
@@ -172,7 +175,7 @@ export function Chart(props) {
           ${width > 0 && series.map((one) => drawSeries(one, xScale, yScale, density))}
         </g>
         ${width > 0 && children?.(plot)}
-        <${Rules} rules=${rules} plot=${plot} />
+        <${Rules} rules=${rules} plot=${plot} isBelow=${spans.some(({ label }) => label)} />
         <${Markers} markers=${markers} plot=${plot} />
       </svg>
       ${

@@ -76,9 +76,7 @@ export function ChartTools({
   const saveSvg = () => saveBlob(svgBlob(make()), `${name}.svg`);
   return html`<div class="chart-tools">
     ${isZoomed && html`<${IconButton} label=${`Show the whole: ${title}`} onClick=${onWhole}>Whole<//>`}
-    <${IconButton} label=${`Numbers: ${title}`} pressed=${hasNumbers} onClick=${onNumbers}
-      >Numbers<//
-    >
+    ${series.length > 0 && html`<${IconButton} label=${`Numbers: ${title}`} pressed=${hasNumbers} onClick=${onNumbers}>Numbers<//>`}
     <${IconButton} label=${`Save as PNG: ${title}`} onClick=${savePng}>PNG<//>
     <${IconButton} label=${`Save as SVG: ${title}`} onClick=${saveSvg}>SVG<//>
   </div>`;

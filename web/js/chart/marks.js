@@ -14,7 +14,7 @@ export function Spans({ spans, plot }) {
   });
 }
 
-function Rule({ rule, plot }) {
+function Rule({ rule, plot, line }) {
   const { x, y, left, right, top, bottom } = plot;
   const style = { "--ink": `var(--${rule.color ?? "quiet"})` };
   if (rule.x !== undefined) {
@@ -23,7 +23,10 @@ function Rule({ rule, plot }) {
     const isLate = at > (left + right) / 2;
     return html`<g class="rule" style=${style}>
       <line x1=${at} x2=${at} y1=${top} y2=${bottom} />
-      <text x=${isLate ? at - 5 : at + 5} y=${top + 14} text-anchor=${isLate ? "end" : "start"}
+      <text
+        x=${isLate ? at - 5 : at + 5}
+        y=${top + 14 * (line + 1)}
+        text-anchor=${isLate ? "end" : "start"}
         >${rule.label}</text
       >
     </g>`;
@@ -38,8 +41,14 @@ function Rule({ rule, plot }) {
   </g>`;
 }
 
-export const Rules = ({ rules, plot }) =>
-  rules.map((rule) => html`<${Rule} rule=${rule} plot=${plot} />`);
+// Labels of upright rules stand in lines below each other, below those of spans where `isBelow`.
+export const Rules = ({ rules, plot, isBelow }) => {
+  const upright = rules.filter((rule) => rule.x !== undefined && rule.label);
+  return rules.map((rule) => {
+    const line = (isBelow ? 1 : 0) + (Math.max(0, upright.indexOf(rule)) % 3);
+    return html`<${Rule} rule=${rule} plot=${plot} line=${line} />`;
+  });
+};
 
 // Ticks above the plot; a chosen one is longer.
 export function Markers({ markers, plot }) {

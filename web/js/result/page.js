@@ -14,6 +14,7 @@ import { ResultHeadlines } from "./headlines.js";
 import { ImpactPanel } from "./impact.js";
 import { ImpactTable } from "./impacts.js";
 import { Section } from "./legacy.js";
+import { KINDS } from "../study/kinds.js";
 import { StudyButtons, StudyStart } from "./studies.js";
 import { Method } from "./method.js";
 import { Motion } from "./motion.js";
@@ -105,42 +106,22 @@ const Warnings = ({ warnings }) =>
     </ul>
   <//>`;
 
-const design = () => import("../design_view.js");
-const STUDIES = {
-  compare: { title: "Contact models side by side", view: () => import("../compare_view.js") },
-  sensitivity: {
-    title: "What errors of the buffers do",
-    view: () => import("../sensitivity_view.js"),
-  },
-  tradeoff: {
-    title: "Error against cost",
-    component: () => import("../study/tradeoff.js").then(({ TradeoffStudy }) => TradeoffStudy),
-  },
-  sweep: {
-    title: "Sweep",
-    component: () => import("../study/sweep.js").then(({ SweepStudy }) => SweepStudy),
-  },
-  ensemble: { title: "Ensemble", view: () => import("../ensemble_view.js") },
-  optimize: { title: "The best values", view: design },
-  calibrate: { title: "Parameters fitted to a measurement", view: design },
-  response: { title: "Response curve", view: design },
-  fragility: { title: "Fragility", view: design },
-};
-
 // A study: its own view; the run of the scene without it can be opened below.
 function StudyView({ result, query, signal }) {
   const [isOpen, setIsOpen] = useState(false);
   const { kind } = result.study;
-  const { title, view, component } = STUDIES[kind];
+  const { title, load } = KINDS[kind];
   const section = useMemo(
-    () => ({ show: async (host, context) => (await view()).show(host, context) }),
+    () => ({
+      show: async (host, context) => (await import("../compare_view.js")).show(host, context),
+    }),
     [kind],
   );
-  const loaded = useLoaded(async () => component?.(), [kind]);
+  const loaded = useLoaded(async () => load?.() ?? null, [kind]);
   const context = useResultContext(result, signal);
   return html`<${ResultContext.Provider} value=${context}>
       <${Panel} title=${title} help=${title}>
-        ${component ? html`<${Loaded} loaded=${loaded}>${(View) => html`<${View} />`}<//>` : html`<${Section} section=${section} />`}
+        ${load ? html`<${Loaded} loaded=${loaded}>${(View) => html`<${View} />`}<//>` : html`<${Section} section=${section} />`}
         <p>
           <a class="button" href=${link("scene", { result: result.id })}>Change the study</a>
           <a class="help" href=${`guide/study-${kind}.html`} aria-label="Guide: this study">?</a>

@@ -1,7 +1,7 @@
 // What the pages of studies share: the sentence that a study leads to, ways to scenes and runs, names of members.
 import { html, useEffect, useState } from "../ui/preact.js";
 import { go, link, pack } from "../address.js";
-import { Button, Failure } from "../ui/controls.js";
+import { Button, Failure, withSubscripts } from "../ui/controls.js";
 import { quantity, words } from "../units.js";
 
 // The scene alone, without its study.
@@ -24,7 +24,7 @@ export const between = (low, high, unit) =>
 // What a study leads to: one sentence, with what follows from it.
 export const Decision = ({ children, more = [], actions }) =>
   html`<div class="decision">
-    <p class="answer">${children}</p>
+    <p class="answer">${typeof children === "string" ? withSubscripts(children) : children}</p>
     ${more.filter(Boolean).map((text) => html`<p>${text}</p>`)}
     ${actions && html`<div class="actions">${actions}</div>`}
   </div>`;

@@ -1,0 +1,150 @@
+// Parameters fitted to a measurement: what they are and how well they are known, the measured and the fitted motion, what is
+// left between them.
+import { html, useMemo } from "../ui/preact.js";
+import { get } from "../api.js";
+import { Chart } from "../chart/chart.js";
+import { useResult } from "../result/context.js";
+import { share } from "../result/headlines.js";
+import { Table } from "../ui/table.js";
+import { number, quantity, title, words } from "../units.js";
+import { Bars } from "./bars.js";
+import { Decision, SceneLink, between, memberName } from "./parts.js";
+
+const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
+const isKnown = { true: "yes", false: "no" };
+
+// "25 ± 0.03 ms"
+function parameterText({ value, standard_error: error, unit }) {
+  const text = quantity(value, unit);
+  return Number.isFinite(error) ? `${text} ± ${quantity(error, unit, 2)}` : text;
+}
+
+export function CalibrateStudy() {
+  const { result, path } = useResult();
+  const { study } = result;
+  const { parameters, detail, motions, residual_rms: residuals, shift } = study;
+  const found = parameters
+    .map((one) => `${memberName(pointerOf(one))} ${parameterText(one)}`)
+    .join(", ");
+  const remarks = [
+    `${detail.replace(/^./, (letter) => letter.toUpperCase())}.`,
+    shift !== 0 &&
+      shift !== null &&
+      `The measurement begins ${quantity(shift, "s")} later than the scene.`,
+    ...study.warnings.map(({ detail: text }) => `${text}.`),
+  ];
+  const use = html`<${SceneLink}
+    className="button primary"
+    label="Run the scene with these values"
+    load=${() => get(`${path}/calibration/scene`)}
+    keys=${[result.id]}
+  />`;
+  return html`<${Decision} more=${remarks} actions=${use}>${title(study.verdict)}: ${found}.<//>
+    ${motions.map((motion, at) => html`<${Motion} key=${at} motion=${motion} />`)}
+    <${Intervals} parameters=${parameters} />
+    <${Parameters} parameters=${parameters} />
+    ${residuals && html`<${Residuals} residuals=${residuals} />`}`;
+}
+
+function Motion({ motion: { channel, unit, is_spectrum: isSpectrum, at, measured, fitted } }) {
+  const difference = useMemo(
+    () => measured.map((value, index) => value - fitted[index]),
+    [measured, fitted],
+  );
+  const x = isSpectrum
+    ? { label: "Frequency", unit: "Hz", log: true }
+    : { label: "Time", unit: "s" };
+  const y = { label: title(channel), unit, log: isSpectrum };
+  const name = isSpectrum ? `Spectrum of the ${words(channel)}` : title(channel);
+  const series = [
+    { label: "measured", color: "text", lineWidth: 1, x: at, y: measured },
+    { label: "fitted", color: "c2", x: at, y: fitted },
+  ];
+  const left = [{ label: "measured less fitted", color: "c6", x: at, y: difference }];
+  return html`<${Chart}
+      title=${name}
+      height=${220}
+      x=${x}
+      y=${y}
+      series=${series}
+      group="fit"
+      isCompact=${!isSpectrum}
+    />
+    ${!isSpectrum && html`<${Chart} title=${`${name}, measured less fitted`} height=${110} x=${x} y=${{ label: "Measured less fitted", unit }} series=${left} group="fit" />`}`;
+}
+
+// Each interval as a part of its value: which parameter is known best.
+function Intervals({ parameters }) {
+  const rows = parameters
+    .filter(({ value, interval_95: interval }) => value !== 0 && interval)
+    .map((one) => ({
+      label: title(memberName(pointerOf(one))),
+      from: one.interval_95[0] / one.value,
+      to: one.interval_95[1] / one.value,
+      color: one.identifiable === false ? "c6" : "c1",
+      text: `± ${share((one.interval_95[1] - one.interval_95[0]) / 2 / Math.abs(one.value), 2)}`,
+    }));
+  if (rows.length === 0) return null;
+  return html`<${Bars}
+    title="How well each is known"
+    x=${{ label: "95 % interval as a part of the value", unit: "1" }}
+    rows=${rows}
+    origin=${1}
+  />`;
+}
+
+function Parameters({ parameters }) {
+  const columns = [
+    { label: "Parameter", value: (one) => title(memberName(pointerOf(one))) },
+    {
+      label: "Value",
+      isNumeric: true,
+      value: ({ value }) => value,
+      cell: (one) => quantity(one.value, one.unit),
+    },
+    {
+      label: "Standard error",
+      isNumeric: true,
+      value: (one) => one.standard_error,
+      cell: (one) => quantity(one.standard_error, one.unit, 3),
+    },
+    {
+      label: "95 %",
+      value: ({ interval_95: interval, unit }) => (interval ? between(...interval, unit) : null),
+    },
+    { label: "Identifiable", value: ({ identifiable }) => isKnown[identifiable] ?? null },
+  ];
+  return html`<${Table} caption="Parameters" columns=${columns} rows=${parameters} />`;
+}
+
+function Residuals({ residuals }) {
+  const columns = [
+    { label: "Channel", value: ({ channel }) => title(channel) },
+    {
+      label: "RMS of what is left",
+      isNumeric: true,
+      value: ({ value }) => value,
+      cell: (one) => quantity(one.value, one.unit, 3),
+    },
+    {
+      label: "Measured RMS",
+      isNumeric: true,
+      value: (one) => one.measured_rms,
+      cell: (one) => quantity(one.measured_rms, one.unit, 3),
+    },
+    {
+      label: "Part",
+      isNumeric: true,
+      value: (one) => one.value / one.measured_rms,
+      cell: (one) => share(one.value / one.measured_rms, 3),
+    },
+    {
+      label: "Stated noise",
+      isNumeric: true,
+      value: ({ deviation }) => deviation,
+      cell: (one) => (one.deviation === null ? "–" : quantity(one.deviation, one.unit, 3)),
+    },
+    { label: "Samples", isNumeric: true, value: ({ samples }) => number(samples, 9) },
+  ];
+  return html`<${Table} caption="Residuals" columns=${columns} rows=${residuals} />`;
+}

@@ -1,0 +1,217 @@
+// The best values: the search as it went, what they gain, how far they may vary, what comes close; for two objectives the
+// front of compromises.
+import { html, useMemo } from "../ui/preact.js";
+import { get, schema as schemaNamed } from "../api.js";
+import { Chart } from "../chart/chart.js";
+import { useResult } from "../result/context.js";
+import { share } from "../result/headlines.js";
+import { unitAt } from "../scene/inputs.js";
+import { useLoaded } from "../ui/store.js";
+import { Table } from "../ui/table.js";
+import { quantity, title, words } from "../units.js";
+import { Bars } from "./bars.js";
+import { Decision, SceneLink, between, memberName, valueText } from "./parts.js";
+
+const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
+
+export function OptimizeStudy() {
+  const { result, path } = useResult();
+  const { study, units } = result;
+  const schema = useLoaded(() => schemaNamed("scene"), []);
+  const unitOf = (one) => (schema.data ? unitAt(schema.data, pointerOf(one)) : undefined);
+  const values = (list) =>
+    list
+      .map((one) => `${memberName(pointerOf(one))} ${valueText(one.value, unitOf(one))}`)
+      .join(", ");
+  const { best, objectives, front, region, rivals, candidates, runs } = study;
+  const [goal] = objectives;
+  const remarks = [
+    `${candidates} candidates, ${runs} runs.`,
+    ...study.warnings.map(({ detail }) => `${detail}.`),
+  ];
+  const use = html`<${SceneLink}
+    className="button primary"
+    label="Run the scene with these values"
+    load=${() => get(`${path}/optimum/scene`)}
+    keys=${[result.id]}
+  />`;
+  return html`<${Decision} more=${remarks} actions=${best && use}>
+      ${decisionOf(study, units, values)}
+    <//>
+    ${objectives.length > 1 && front.length > 0 && html`<${Front} study=${study} units=${units} values=${values} />`}
+    <${Gain} study=${study} units=${units} />
+    ${objectives.length === 1 && html`<${Search} study=${study} unit=${units[goal.metric]} unitOf=${unitOf} />`}
+    ${region.some(({ low }) => low !== null) && html`<${Region} region=${region} unitOf=${unitOf} />`}
+    ${rivals.length > 0 && html`<${Rivals} rivals=${rivals} unit=${units[goal.metric]} values=${values} />`}`;
+}
+
+function decisionOf({ best, given, undamped, objectives }, units, values) {
+  if (!best) return "No candidate keeps the constraints.";
+  const [{ metric, value, interval_95: interval }] = best.objectives;
+  const unit = units[metric];
+  const against = [
+    [given.metrics[metric], "the given scene"],
+    [undamped?.metrics[metric], "the structure without dampers"],
+  ]
+    .filter(([reference]) => reference > 0)
+    .map(([reference, name]) => {
+      const part = 1 - value / reference;
+      return `${share(Math.abs(part))} ${part >= 0 ? "below" : "above"} ${name}`;
+    });
+  const range = interval ? ` (95 %: ${between(...interval, unit)})` : "";
+  const isSingle = objectives.length === 1;
+  const lead = isSingle ? "Best" : "A good compromise";
+  return `${lead}: ${values(best.values)}. ${title(metric)} ${quantity(value, unit)}${range}, ${against.join(" and ")}.`;
+}
+
+// Metrics of the best, the given scene and the structure without dampers, each as a part of the last.
+function Gain({ study: { best, given, undamped }, units }) {
+  const metrics = Object.keys(given.metrics).filter(
+    (metric) => Number.isFinite(given.metrics[metric]) && !metric.endsWith("_reduction"),
+  );
+  const rows = metrics
+    .filter((metric) => undamped?.metrics[metric] > 0 && Number.isFinite(best?.metrics[metric]))
+    .flatMap((metric) =>
+      [
+        ["best", best, "ok"],
+        ["given", given, "c8"],
+      ].map(([name, { metrics: of }, color]) => ({
+        label: `${title(metric)}, ${name}`,
+        from: 0,
+        to: of[metric] / undamped.metrics[metric],
+        color,
+        text: quantity(of[metric], units[metric], 3),
+      })),
+    );
+  const of = (label, source) => ({
+    label,
+    isNumeric: true,
+    value: (metric) => source?.metrics[metric],
+    cell: (metric) => quantity(source?.metrics[metric], units[metric]),
+  });
+  const columns = [
+    { label: "Metric", value: title },
+    of("Best", best),
+    of("Given", given),
+    of("Without dampers", undamped),
+  ];
+  return html`${rows.length > 0 && html`<${Bars} title="Gain" x=${{ label: "As a part of the structure without dampers", unit: "1" }} rows=${rows} origin=${1} />`}
+    <${Table} caption="Gain" columns=${columns} rows=${metrics} />`;
+}
+
+// The first objective of every candidate over the variable of numbers, by what else was chosen.
+function Search({ study: { history, best, objectives }, unit, unitOf }) {
+  const [{ metric }] = objectives;
+  const variables = history[0]?.values ?? [];
+  const at = variables.findIndex(({ value }) => typeof value === "number");
+  const groups = useMemo(() => {
+    const named = ({ values }) =>
+      values
+        .filter(({ value }) => typeof value !== "number")
+        .map(({ value }) => valueText(value))
+        .join(", ");
+    return [...Map.groupBy(history, (one) => named(one) || "candidates")].slice(0, 8);
+  }, [history]);
+  if (at < 0) return null;
+  const variable = variables[at];
+  const series = groups.map(([label, rows], index) => ({
+    kind: "points",
+    size: 7,
+    label,
+    color: `c${index + 1}`,
+    x: rows.map(({ values }) => values[at].value),
+    y: rows.map(({ objectives }) => objectives[0] ?? NaN),
+  }));
+  const name = memberName(pointerOf(variable));
+  const chosen = best?.values[at].value;
+  return html`<${Chart}
+    title="The search"
+    height=${260}
+    x=${{ label: title(name), unit: unitOf(variable) ?? "1" }}
+    y=${{ label: `${title(metric)} of every candidate`, unit }}
+    series=${series}
+    rules=${chosen === undefined ? [] : [{ x: chosen, label: "best", color: "ok" }]}
+  />`;
+}
+
+function Front({ study: { front, objectives, best }, units, values }) {
+  const [first, second] = objectives;
+  const sorted = front.toSorted((a, b) => a.objectives[0] - b.objectives[0]);
+  const series = [
+    {
+      label: "best compromises",
+      color: "ok",
+      x: sorted.map((one) => one.objectives[0]),
+      y: sorted.map((one) => one.objectives[1]),
+    },
+    {
+      kind: "points",
+      size: 8,
+      label: "candidates on the front",
+      color: "ok",
+      x: sorted.map((one) => one.objectives[0]),
+      y: sorted.map((one) => one.objectives[1]),
+    },
+  ];
+  const rules = best
+    ? [{ x: best.objectives[0].value, label: "recommended", color: "accent" }]
+    : [];
+  const columns = [
+    { label: "Values", value: (one) => values(one.values) },
+    ...objectives.map(({ metric }, at) => ({
+      label: title(metric),
+      unit: units[metric],
+      value: (one) => one.objectives[at],
+    })),
+  ];
+  const hint = second
+    ? `No candidate has both less ${words(first.metric)} and less ${words(second.metric)} than one of these.`
+    : "";
+  return html`${
+      second &&
+      html`<${Chart}
+        title="Best compromises"
+        height=${280}
+        x=${{ label: title(first.metric), unit: units[first.metric] }}
+        y=${{ label: title(second.metric), unit: units[second.metric] }}
+        series=${series}
+        rules=${rules}
+      />`
+    }
+    <p class="hint">${hint}</p>
+    <${Table} caption="Best compromises" columns=${columns} rows=${sorted} />`;
+}
+
+function Region({ region, unitOf }) {
+  const columns = [
+    { label: "Member", value: (one) => title(memberName(pointerOf(one))) },
+    {
+      label: "From",
+      isNumeric: true,
+      value: ({ low }) => low,
+      cell: (one) => quantity(one.low, unitOf(one)),
+    },
+    {
+      label: "To",
+      isNumeric: true,
+      value: ({ high }) => high,
+      cell: (one) => quantity(one.high, unitOf(one)),
+    },
+  ];
+  const rows = region.filter(({ low }) => low !== null);
+  return html`<h3>Within 2 % of the best</h3>
+    <${Table} caption="Within 2 % of the best" columns=${columns} rows=${rows} />`;
+}
+
+function Rivals({ rivals, unit, values }) {
+  const columns = [
+    { label: "Values", value: (one) => values(one.values) },
+    { label: "Worse by", unit, value: ({ difference }) => difference },
+    {
+      label: "95 %",
+      value: ({ interval_95: interval }) => (interval ? between(...interval, unit) : null),
+    },
+  ];
+  return html`<h3>What comes close</h3>
+    <${Table} caption="What comes close" columns=${columns} rows=${rivals} />`;
+}

@@ -1,0 +1,145 @@
+// The response to a harmonic load: amplitude over the frequency (or what else varies), stable and unstable motions, those
+// without a period, and the structure without its dampers. In the address: metric.
+import { html, useMemo } from "../ui/preact.js";
+import { Chart } from "../chart/chart.js";
+import { useResult } from "../result/context.js";
+import { share } from "../result/headlines.js";
+import { Choice } from "../ui/controls.js";
+import { Table } from "../ui/table.js";
+import { quantity, title } from "../units.js";
+import { Decision, memberName } from "./parts.js";
+
+const METRICS = ["peak_displacement", "rms_displacement"];
+
+// Points of one branch and one kind as a line; a gap (NaN) parts it from the next. A line goes on to the first point of the
+// other kind.
+function lineOf(points, metric, isWanted) {
+  const line = { x: [], y: [], points: [] };
+  const push = (point) => {
+    line.x.push(point?.value ?? NaN);
+    line.y.push(point?.[metric] ?? NaN);
+    line.points.push(point);
+  };
+  for (const branch of Map.groupBy(points, ({ branch: number }) => number).values()) {
+    let isOpen = false;
+    branch.forEach((point, at) => {
+      const isIn = isWanted(point);
+      if (isIn && !isOpen && at > 0 && branch[at - 1].period) push(branch[at - 1]);
+      if (isIn) push(point);
+      if (!isIn && isOpen) push(null);
+      isOpen = isIn;
+    });
+    if (isOpen) push(null);
+  }
+  return line;
+}
+
+// One value for each place, in their order.
+function undampedOf(points) {
+  const values = new Map();
+  for (const { value, undamped_peak_displacement: peak } of points)
+    if (Number.isFinite(peak)) values.set(value, peak);
+  const places = [...values.keys()].sort((a, b) => a - b);
+  return { x: places, y: places.map((place) => values.get(place)) };
+}
+
+const largest = (points, key) =>
+  points.reduce((best, point) => (point[key] > (best?.[key] ?? -Infinity) ? point : best), null);
+
+function decisionOf(points, name, unit) {
+  const worst = largest(
+    points.filter(({ stable }) => stable !== false),
+    "peak_displacement",
+  );
+  const bare = largest(points, "undamped_peak_displacement");
+  if (!worst) return "No motion was found.";
+  const at = `${quantity(worst.peak_displacement, "m")} at ${name} ${quantity(worst.value, unit)}`;
+  if (!bare) return `The largest displacement is ${at}.`;
+  const part = 1 - worst.peak_displacement / bare.undamped_peak_displacement;
+  const against = `${share(Math.abs(part))} ${part > 0 ? "below" : "above"} the largest without dampers (${quantity(bare.undamped_peak_displacement, "m")} at ${quantity(bare.value, unit)})`;
+  return `The largest displacement is ${at}, ${against}.`;
+}
+
+export function ResponseStudy() {
+  const { result, query, change } = useResult();
+  const { study } = result;
+  const { points, unit, pointer, pointers } = study;
+  const name = memberName(pointer ?? pointers[0]);
+  const metric = METRICS.includes(query.metric) ? query.metric : METRICS[0];
+  const series = useMemo(() => {
+    const irregular = points.filter(({ period }) => !period);
+    const all = [
+      metric === METRICS[0] && { label: "without dampers", color: "ghost", ...undampedOf(points) },
+      {
+        label: "stable",
+        color: "displacement",
+        lineWidth: 2,
+        ...lineOf(points, metric, ({ period, stable }) => period && stable),
+      },
+      {
+        label: "unstable",
+        color: "displacement",
+        dash: true,
+        ...lineOf(points, metric, ({ period, stable }) => period && !stable),
+      },
+      {
+        kind: "points",
+        size: 5,
+        label: "without a period",
+        color: "c6",
+        x: irregular.map(({ value }) => value),
+        y: irregular.map((point) => point[metric]),
+      },
+    ];
+    return all.filter((one) => one && one.x.length > 0);
+  }, [result.id, metric]);
+  const periods = [...new Set(points.map(({ period }) => period))].filter((period) => period > 1);
+  const unstable = points.filter(({ stable }) => stable === false).length;
+  const irregular = points.filter(({ period }) => !period).length;
+  const facts = [
+    periods.length > 0 &&
+      `Motions that repeat after ${periods.sort((a, b) => a - b).join(", ")} cycles of the load were found too.`,
+    irregular > 0 && `${irregular} of ${points.length} points have no period.`,
+    unstable > 0 && `${unstable} motions are unstable: none of them lasts.`,
+    ...study.warnings.map(
+      ({ detail }) => `${detail.replace(/^./, (letter) => letter.toUpperCase())}.`,
+    ),
+  ];
+  return html`<${Decision} more=${facts}>${decisionOf(points, name, unit)}<//>
+    <div class="row">
+      <${Choice}
+        label="Metric"
+        options=${METRICS.map((value) => ({ value, label: title(value) }))}
+        value=${metric}
+        onChange=${(value) => change({ metric: value })}
+      />
+    </div>
+    <${Chart}
+      title="Response curve"
+      height=${360}
+      x=${{ label: title(name), unit: unit ?? "1" }}
+      y=${{ label: title(metric), unit: "m" }}
+      series=${series}
+    />
+    <${Points} points=${points} unit=${unit} name=${name} />`;
+}
+
+function Points({ points, unit, name }) {
+  const columns = [
+    { label: title(name), unit: unit ?? "1", value: ({ value }) => value },
+    { label: "Direction", value: ({ direction }) => direction ?? "continuation" },
+    { label: "Period [cycles]", isNumeric: true, value: ({ period }) => period },
+    { label: "Impacts a period", isNumeric: true, value: (one) => one.impacts_per_period },
+    {
+      label: "Stable",
+      value: ({ period, stable }) => (period ? (stable ? "yes" : "no") : null),
+    },
+    { label: "Peak displacement", unit: "m", value: (one) => one.peak_displacement },
+    { label: "Without dampers", unit: "m", value: (one) => one.undamped_peak_displacement },
+    { label: "Lyapunov exponent", unit: "1/s", value: (one) => one.lyapunov },
+  ];
+  return html`<details>
+    <summary>All points as a table</summary>
+    <${Table} caption="Points" columns=${columns} rows=${points} filter="Words of a row" />
+  </details>`;
+}
