@@ -109,7 +109,7 @@ def test_every_type_of_problem_has_its_section():
 def test_every_question_mark_of_the_dashboard_leads_to_a_section():
     """The places of js/help.js and the pages of studies exist, and the header of the dashboard has the guide."""
     places = re.findall(r'"?: "([\w-]+)(?:#([\w-]+))?"', read("web", "js", "help.js"))
-    kinds = re.findall(r"^  (\w+): \{", re.search(r"const STUDIES = \{(.*?)\n\};", read("web", "js", "result", "page.js"), re.S)[1], re.M)
+    kinds = re.findall(r"^  (\w+): \{", re.search(r"const KINDS = \{(.*?)\n\};", read("web", "js", "study", "kinds.js"), re.S)[1], re.M)
     assert len(kinds) == 9, kinds
     places += [(f"study-{kind}", "") for kind in kinds]
     for folder, _, files in os.walk(os.path.join(program.SOURCE, "web", "js")):

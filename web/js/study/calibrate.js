@@ -8,7 +8,7 @@ import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
-import { Decision, SceneLink, between, memberName } from "./parts.js";
+import { Decision, SceneLink, between, memberName, sentence } from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 const isKnown = { true: "yes", false: "no" };
@@ -27,11 +27,11 @@ export function CalibrateStudy() {
     .map((one) => `${memberName(pointerOf(one))} ${parameterText(one)}`)
     .join(", ");
   const remarks = [
-    `${detail.replace(/^./, (letter) => letter.toUpperCase())}.`,
+    sentence(detail),
     shift !== 0 &&
       shift !== null &&
       `The measurement begins ${quantity(shift, "s")} later than the scene.`,
-    ...study.warnings.map(({ detail: text }) => `${text}.`),
+    ...study.warnings.map(({ detail: text }) => sentence(text)),
   ];
   const use = html`<${SceneLink}
     className="button primary"

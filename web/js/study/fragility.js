@@ -6,7 +6,7 @@ import { useResult } from "../result/context.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Decision, between } from "./parts.js";
+import { Decision, between, sentence } from "./parts.js";
 
 const STEPS = 200;
 
@@ -24,7 +24,9 @@ export function normal(x) {
 const measureText = ({ period, measure }) =>
   period
     ? `Spectral acceleration at ${quantity(period, "s")}`
-    : title(measure ?? "peak ground acceleration");
+    : measure && measure !== "pga"
+      ? title(measure)
+      : "Peak ground acceleration";
 
 // Of each level the part of the records whose metric exceeds the limit.
 function observed(curves, { metric, value }) {
@@ -89,7 +91,7 @@ export function FragilityStudy() {
   const remarks = [
     hasFit &&
       `Dispersion ${number(limit.dispersion, 3)} (95 %: ${between(...limit.dispersion_interval_95, "")}); ${limit.exceeded} of ${curves.length} records exceed the limit within the levels.`,
-    ...study.warnings.map(({ detail }) => `${detail}.`),
+    ...study.warnings.map(({ detail }) => sentence(detail)),
   ];
   return html`<${Decision} more=${remarks}>${answer}<//>
     <div class="row">

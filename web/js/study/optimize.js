@@ -10,7 +10,7 @@ import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
-import { Decision, SceneLink, between, memberName, valueText } from "./parts.js";
+import { Decision, SceneLink, between, memberName, sentence, valueText } from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 
@@ -27,7 +27,7 @@ export function OptimizeStudy() {
   const [goal] = objectives;
   const remarks = [
     `${candidates} candidates, ${runs} runs.`,
-    ...study.warnings.map(({ detail }) => `${detail}.`),
+    ...study.warnings.map(({ detail }) => sentence(detail)),
   ];
   const use = html`<${SceneLink}
     className="button primary"

@@ -18,6 +18,10 @@ export function valueText(value, unit, digits = 4) {
   return value === null || value === undefined ? "–" : JSON.stringify(value).slice(0, 80);
 }
 
+// A clause of the service as a sentence.
+export const sentence = (clause) =>
+  `${clause.replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase())}.`;
+
 export const between = (low, high, unit) =>
   `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
 

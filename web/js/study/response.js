@@ -7,7 +7,7 @@ import { share } from "../result/headlines.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { quantity, title } from "../units.js";
-import { Decision, memberName } from "./parts.js";
+import { Decision, memberName, sentence } from "./parts.js";
 
 const METRICS = ["peak_displacement", "rms_displacement"];
 
@@ -101,9 +101,7 @@ export function ResponseStudy() {
       `Motions that repeat after ${periods.sort((a, b) => a - b).join(", ")} cycles of the load were found too.`,
     irregular > 0 && `${irregular} of ${points.length} points have no period.`,
     unstable > 0 && `${unstable} motions are unstable: none of them lasts.`,
-    ...study.warnings.map(
-      ({ detail }) => `${detail.replace(/^./, (letter) => letter.toUpperCase())}.`,
-    ),
+    ...study.warnings.map(({ detail }) => sentence(detail)),
   ];
   return html`<${Decision} more=${facts}>${decisionOf(points, name, unit)}<//>
     <div class="row">
