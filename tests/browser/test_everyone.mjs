@@ -37,14 +37,24 @@ test("The report of a result has its numbers, charts, impacts and inputs; on pap
   assert.ok((await page.pdf()).length > 20000);
 });
 
-// Pictures of all that is drawn: [section, PNG].
+// A picture once two in a row are the same.
+async function stillPicture(element) {
+  let last = "";
+  return until("a picture that stands still", async () => {
+    const next = (await element.screenshot({ animations: "disabled" })).toString("base64"), isSame = next === last;
+    last = next;
+    return isSame && next;
+  });
+}
+
+// Pictures of all that is drawn: [name, PNG].
 const charts = async (page) => {
   const pictures = [], all = await page.locator("main canvas, main svg").all();
   for (const one of all) if (await one.isVisible()) await one.scrollIntoViewIfNeeded(); // some begin when they are seen
   await until("all to be drawn", async () => !/loading …/i.test(await page.locator("main").innerText()));
   for (const one of all)
     if (await one.isVisible())
-      pictures.push([await one.evaluate((node) => node.closest("section")?.id), (await one.screenshot({ animations: "disabled" })).toString("base64")]);
+      pictures.push([await one.evaluate((node) => node.closest("figure, section")?.ariaLabel), await stillPicture(one)]);
   return pictures;
 };
 // The sections whose pictures differ.

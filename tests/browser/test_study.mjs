@@ -61,6 +61,21 @@ test("A study's chart opened by itself has its colours, light and dark", async (
   assert.deepEqual(fills, ["rgb(255, 255, 255)", "rgb(22, 24, 28)"]);
 });
 
+test("Contact models side by side: how far each is off, by a choice of measures, spectra and motions, those that were refused", async ({ page, daemon, url }) => {
+  const main = await open(page, daemon, url, "compare_sponge");
+  await says(main, /The impulse model's spectrum is off by 16 dB: its contacts take no time, these 26 ms on average\./);
+  await says(main, /impulse from 46 ms on/);
+  const bars = page.getByRole("figure", { name: "Apart from spring damper, zero penetration" });
+  await until("levels", async () => /\+16\.2 dB/.test(await bars.locator("svg").textContent()));
+  await page.getByRole("button", { name: "RMS displacement", exact: true }).click();
+  await leads(page, /by=rms_displacement/);
+  await until("changes", async () => /\+4\.18 %/.test(await bars.locator("svg").textContent()));
+  for (const name of ["Spectra of the mean acceleration", "Displacement over time"]) await says(page.getByRole("figure", { name }), /impulse/);
+  await says(page.getByRole("table", { name: "Numbers that differ" }), /lankarani nikravesh/);
+  await says(main, /Not run: hertz\./);
+  assert.deepEqual(await axe(page), []);
+});
+
 test("Below a study stands the scene's own run", async ({ page, daemon, url }) => {
   await open(page, daemon, url, "compare_sponge");
   assert.equal(await page.getByRole("region", { name: "Motion over time" }).count(), 0);

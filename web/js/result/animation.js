@@ -34,7 +34,7 @@ function usualPace({ plan }) {
 }
 
 // The motion's states and trails: {missing, stateAt(t), trailAt(t, pace)}; null while data are on their way.
-function useMotion({ result, path, classic }, model, onPiece, onFailure) {
+function useMotion({ result, path, signal }, model, onPiece, onFailure) {
   return useMemo(() => {
     const made = channelsOf(model, channelNames(result));
     if (made.missing.length > 0) return made;
@@ -43,7 +43,7 @@ function useMotion({ result, path, classic }, model, onPiece, onFailure) {
       rate: result.sample_rate,
       channels: made.channels,
       end: (result.count - 1) / result.sample_rate,
-      signal: classic.signal,
+      signal,
       onPiece,
       onFailure,
     });
@@ -67,7 +67,7 @@ function useMotion({ result, path, classic }, model, onPiece, onFailure) {
 }
 
 // The instant: {t, isPlaying, seek(t), play(on), note()}. What changes the address elsewhere moves it.
-function usePlayer({ query, ledger, change, classic }, window, pace, isLooped, isReady, onFrame) {
+function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, isReady, onFrame) {
   const [t, setT] = useState(window.from);
   const [isPlaying, setPlaying] = useState(false);
   const isRunning = useRef(false); // at once, before it is drawn
@@ -113,7 +113,7 @@ function usePlayer({ query, ledger, change, classic }, window, pace, isLooped, i
       .at(Number(query.impact))
       .catch(() => null)
       .then((row) => {
-        if (pending.current !== query.impact || classic.signal.aborted) return;
+        if (pending.current !== query.impact || signal.aborted) return;
         pending.current = null;
         seek(row?.start ?? latest.current.window.from);
         if (followed.current.t !== undefined) note();
@@ -170,7 +170,7 @@ function usePlayer({ query, ledger, change, classic }, window, pace, isLooped, i
   const step = (side) => {
     queue.current = queue.current.then(async () => {
       const row = await neighbour(ledger, now.current, side).catch(() => null);
-      if (!row || classic.signal.aborted) return;
+      if (!row || signal.aborted) return;
       const { from, to } = latest.current.window;
       const isAway = row.start < from || row.start > to;
       pending.current = null;
@@ -264,7 +264,7 @@ export function Animation() {
         window=${window}
         t=${t}
         pace=${pace}
-        signal=${context.classic.signal}
+        signal=${context.signal}
       />
       <input
         type="range"

@@ -1,8 +1,28 @@
 // What all parts of a result's page share: the result, its impacts, the view that the address holds, and how to change it.
-import { createContext, useContext } from "../ui/preact.js";
+import { note, read } from "../address.js";
+import { get } from "../api.js";
+import { createContext, useContext, useMemo, useState } from "../ui/preact.js";
+import { Ledger } from "./ledger.js";
 
 export const ResultContext = createContext(null);
 export const useResult = () => useContext(ResultContext);
+
+// {result, path, query, change, ledger, jobs (a promise of the latest), signal}: `query` is the address as it is now; change()
+// writes to it, and what shows the context is drawn again.
+export function useResultContext(result, signal) {
+  const [, redraw] = useState(0);
+  const path = `v1/results/${result.id}`;
+  const kept = useMemo(() => {
+    const jobs = get("v1/jobs", { result: result.id, limit: 20 }).then((answer) => answer.jobs);
+    jobs.catch(() => {}); // who shows them says so
+    return { jobs, ledger: new Ledger({ path, result }) };
+  }, [result.id]);
+  const change = (changes, push = false) => {
+    note(changes, push);
+    redraw((count) => count + 1);
+  };
+  return { result, path, query: read().query, change, signal, ...kept };
+}
 
 // The window of time in view: {from, to, end}; the whole unless the query says otherwise.
 export function windowOf(result, query) {

@@ -49,9 +49,10 @@ function useCost({ result, jobs }) {
 }
 
 export function Method() {
-  const { result, classic } = useResult();
+  const context = useResult();
+  const { result } = context;
   const { plan, summary, engine } = result;
-  const cost = useCost(classic);
+  const cost = useCost(context);
   const shown = DERIVED.filter(([, key]) =>
     plan.derived.some((row) => row[key] !== null && row[key] !== undefined),
   );

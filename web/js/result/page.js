@@ -1,68 +1,26 @@
 // A result: the six numbers, the motion beside its animation and the selected impact, and everything else in tabs.
-import { html, useMemo, useState } from "../ui/preact.js";
-import { link, note, read } from "../address.js";
+import { html, useState } from "../ui/preact.js";
+import { link } from "../address.js";
 import { get, session } from "../api.js";
 import { Failure, Loaded, Notice, Panel, Tabs } from "../ui/controls.js";
 import { useLoaded, useStore } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
-import { Ledger } from "../ledger.js";
 import { Animation } from "./animation.js";
-import { ResultContext, windowOf } from "./context.js";
+import { ResultContext, useResultContext } from "./context.js";
 import { Energy } from "./energy.js";
 import { Files } from "./files.js";
 import { ResultHeadlines } from "./headlines.js";
 import { ImpactPanel } from "./impact.js";
 import { ImpactTable } from "./impacts.js";
-import { Section } from "./legacy.js";
 import { KINDS } from "../study/kinds.js";
 import { StudyButtons, StudyStart } from "./studies.js";
 import { Method } from "./method.js";
 import { Motion } from "./motion.js";
 import { Spectrum } from "./spectrum.js";
 
-// What parts built from elements expect: the result, its latest jobs, its impacts, the view and how to change it.
-class ClassicContext {
-  followers = new Set();
-  constructor(result, signal, change) {
-    Object.assign(this, { result, signal, change, path: `v1/results/${result.id}`, view: {} });
-    this.ledger = new Ledger(this);
-    this.jobs = get("v1/jobs", { result: result.id, limit: 20 }).then(({ jobs }) => jobs);
-    this.jobs.catch(() => {}); // who shows them says so
-  }
-  get window() {
-    return windowOf(this.result, this.view);
-  }
-}
-
-// What the parts of the page share, by the address as it is now.
-export function useResultContext(result, signal) {
-  const [, redraw] = useState(0);
-  const classic = useMemo(() => {
-    const change = (changes, push = false) => {
-      note(changes, push);
-      made.view = read().query;
-      for (const follow of made.followers) follow(made.view);
-      redraw((count) => count + 1);
-    };
-    const made = new ClassicContext(result, signal, change);
-    return made;
-  }, [result.id]);
-  const { query } = read();
-  classic.view = query;
-  return {
-    result,
-    query,
-    classic,
-    path: classic.path,
-    ledger: classic.ledger,
-    change: classic.change,
-    signal,
-  };
-}
-
 export function ResultView({ result, signal }) {
   const context = useResultContext(result, signal);
-  const { classic, query: view } = context;
+  const { query: view, change } = context;
   const tabs = [
     { name: "impacts", title: "Impacts", view: () => html`<${ImpactTable} />` },
     { name: "spectrum", title: "Spectrum", view: () => html`<${Spectrum} />` },
@@ -89,7 +47,7 @@ export function ResultView({ result, signal }) {
       label="More of this result"
       tabs=${tabs}
       chosen=${view.tab ?? "impacts"}
-      onChoose=${(name) => classic.change({ tab: name })}
+      onChoose=${(name) => change({ tab: name })}
     />
   <//>`;
 }
@@ -111,17 +69,11 @@ function StudyView({ result, query, signal }) {
   const [isOpen, setIsOpen] = useState(false);
   const { kind } = result.study;
   const { title, load } = KINDS[kind];
-  const section = useMemo(
-    () => ({
-      show: async (host, context) => (await import("../compare_view.js")).show(host, context),
-    }),
-    [kind],
-  );
-  const loaded = useLoaded(async () => load?.() ?? null, [kind]);
+  const loaded = useLoaded(load, [kind]);
   const context = useResultContext(result, signal);
   return html`<${ResultContext.Provider} value=${context}>
       <${Panel} title=${title} help=${title}>
-        ${load ? html`<${Loaded} loaded=${loaded}>${(View) => html`<${View} />`}<//>` : html`<${Section} section=${section} />`}
+        <${Loaded} loaded=${loaded}>${(View) => html`<${View} />`}<//>
         <p>
           <a class="button" href=${link("scene", { result: result.id })}>Change the study</a>
           <a class="help" href=${`guide/study-${kind}.html`} aria-label="Guide: this study">?</a>
@@ -161,7 +113,7 @@ function ResultPage({ address, signal }) {
             >Change this scene</a
           >
           <a class="button" href=${link("compare", { a: loaded.data.id })}>Compare with …</a>
-          ${hasStudies && html`<a class="button" href=${link(`results/${loaded.data.id}/report`)}>Report</a>`}
+          <a class="button" href=${link(`results/${loaded.data.id}/report`)}>Report</a>
           ${hasStudies && html`<${StudyButtons} scene=${loaded.data.scene} onChoose=${setChosen} />`}
         </div>`
       }

@@ -7,15 +7,15 @@ import { useLoaded } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
 import { Table } from "../ui/table.js";
 import { inputsOf } from "../scene/inputs.js";
+import { KINDS } from "../study/kinds.js";
 import { brief, moment, pretty, quantity } from "../units.js";
-import { ResultContext } from "./context.js";
+import { ResultContext, useResultContext } from "./context.js";
 import { Energy } from "./energy.js";
 import { ResultHeadlines } from "./headlines.js";
 import { ImpactTable } from "./impacts.js";
 import { Method } from "./method.js";
 import { Motion } from "./motion.js";
 import { Spectrum } from "./spectrum.js";
-import { useResultContext } from "./page.js";
 
 const load = async (id, signal) => {
   const [result, { jobs }, version, schema] = await Promise.all([
@@ -24,7 +24,8 @@ const load = async (id, signal) => {
     get("version", null, signal),
     schemaNamed("scene"),
   ]);
-  return { result, job: jobs.find((one) => one.title) ?? jobs[0], version, schema };
+  const View = result.study && (await KINDS[result.study.kind].load());
+  return { result, job: jobs.find((one) => one.title) ?? jobs[0], version, schema, View };
 };
 
 const inputColumns = [
@@ -43,9 +44,17 @@ const Part = ({ title, children }) =>
     ${children}
   </section>`;
 
-function Report({ result, job, version, schema, signal }) {
+const Run = ({ links }) =>
+  html`<${ResultHeadlines} />
+    <${Part} title="Motion"><${Motion} /><//>
+    ${links.psd && html`<${Part} title="Spectrum"><${Spectrum} /><//>`}
+    ${links.impacts && html`<${Part} title="Impacts"><${ImpactTable} /><//>`}
+    ${links.energy && html`<${Part} title="Energy"><${Energy} /><//>`}`;
+
+function Report({ result, job, version, schema, View, signal }) {
   const context = useResultContext(result, signal);
-  const { study, ...scene } = result.scene;
+  const { study } = result;
+  const { study: asked, ...scene } = result.scene;
   const { warnings, links } = result;
   const remarks = warnings.map(({ detail }) => html`<li>${detail}</li>`);
   return html`<${ResultContext.Provider} value=${context}>
@@ -54,11 +63,7 @@ function Report({ result, job, version, schema, signal }) {
       ${`Computed ${moment(job?.finished)} by impactd ${version.version}, engine ${result.engine}. `}
       <a href=${link(`results/${result.id}`)}>${`Result ${brief(result.id)}`}</a>
     </p>
-    <${ResultHeadlines} />
-    <${Part} title="Motion"><${Motion} /><//>
-    ${links.psd && html`<${Part} title="Spectrum"><${Spectrum} /><//>`}
-    ${links.impacts && html`<${Part} title="Impacts"><${ImpactTable} /><//>`}
-    ${links.energy && html`<${Part} title="Energy"><${Energy} /><//>`}
+    ${View ? html`<${Part} title=${KINDS[study.kind].title}><${View} /><//>` : html`<${Run} links=${links} />`}
     <${Part} title="How it was computed"><${Method} /><//>
     ${
       remarks.length > 0 &&

@@ -1,6 +1,9 @@
 // The view of each kind of study: its heading, and the component that shows it within a result's context.
 export const KINDS = {
-  compare: { title: "Contact models side by side" },
+  compare: {
+    title: "Contact models side by side",
+    load: async () => (await import("./compare.js")).CompareStudy,
+  },
   sensitivity: {
     title: "What errors of the buffers do",
     load: async () => (await import("./sensitivity.js")).SensitivityStudy,

@@ -1,5 +1,5 @@
 // A result's ledger of impacts, in windows, for it may be long. Each has its `number` from 1.
-import { get } from "./api.js";
+import { get } from "../api.js";
 
 export class Ledger {
   kept = new Map();
@@ -12,8 +12,13 @@ export class Ledger {
   }
 
   async ask(query) {
-    const { kept, context: { path, result } } = this, key = JSON.stringify(query);
-    if (!this.isListed) return { count: result.summary?.impacts ?? 0, resting: 0, impacts: [], matching: 0 };
+    const {
+        kept,
+        context: { path, result },
+      } = this,
+      key = JSON.stringify(query);
+    if (!this.isListed)
+      return { count: result.summary?.impacts ?? 0, resting: 0, impacts: [], matching: 0 };
     if (kept.size > 60) kept.clear();
     if (!kept.has(key)) kept.set(key, get(`${path}/impacts.json`, query));
     kept.get(key).catch(() => kept.delete(key));
@@ -32,6 +37,8 @@ export class Ledger {
 
   // By its number, else null.
   async at(number) {
-    return number >= 1 ? (await this.ask({ first: Math.round(number), limit: 1 })).impacts[0] ?? null : null;
+    return number >= 1
+      ? ((await this.ask({ first: Math.round(number), limit: 1 })).impacts[0] ?? null)
+      : null;
   }
 }
