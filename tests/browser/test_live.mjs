@@ -55,8 +55,10 @@ async function drag(page, name, dx, dy) {
 test("What is dragged in the drawing changes the scene, runs it, and is one step to undo", async ({ page, url }) => {
   await page.goto(url("#/scene"));
   await says(live(page), /22 impacts/);
+  await page.getByRole("heading", { name: "The scene as JSON" }).click();
+  await page.evaluate(() => scrollTo(0, 0));
   const undo = live(page).getByRole("button", { name: "Undo" });
-  const scene = () => page.evaluate(() => JSON.parse(document.querySelector("textarea.code").value));
+  const scene = async () => JSON.parse(await page.getByRole("textbox", { name: "The scene as JSON" }).inputValue());
   await drag(page, "Clearance", 30, 0);
   const wider = (await scene()).dampers[0].clearance;
   assert.ok(wider > 0.018 && wider < 0.04, `${wider} m`);

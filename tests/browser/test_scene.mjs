@@ -7,7 +7,7 @@ const clearance = (page) => page.getByRole("textbox", { name: "Clearance" }).fir
 const box = (page, name) => page.getByRole("textbox", { name, exact: false }).first();
 const shows = (page, pattern) => until(`a drawing of ${pattern}`,
   async () => pattern.test(await page.getByRole("img", { name: /structure|storeys/i }).first().getAttribute("aria-label")));
-const outcome = (page) => page.getByRole("heading", { name: "Estimate" }).locator("..");
+const outcome = (page) => page.getByRole("region", { name: "Estimate" });
 const run = (page) => page.getByRole("button", { name: "Run", exact: true });
 
 // The scene as the page would send it.
@@ -105,12 +105,13 @@ test("Every example goes through the form unchanged", async ({ page, daemon, url
   await clearance(page).waitFor();
   const changed = await page.evaluate(async () => {
     const from = (name) => import(new URL(`web/js/${name}.js`, document.baseURI).href);
-    const [{ makeDraft }, { sceneForm }, { get, schema }] = await Promise.all([from("draft"), from("scene_form"), from("api")]);
+    const [{ makeDraft }, { SceneForm }, { get, schema }, { html, render }] = await Promise.all(
+      [from("form/draft"), from("scene/steps"), from("api"), from("ui/preact")]);
     const told = [], shown = [];
     for (const { name, scene } of (await get("v1/examples")).examples) {
       const host = document.body.appendChild(document.createElement("div"));
       const draft = makeDraft(structuredClone(scene));
-      sceneForm(host, { schema: await schema("scene"), draft, widgets: [] });
+      render(html`<${SceneForm} schema=${await schema("scene")} draft=${draft} widgets=${[]} />`, host);
       shown.push({ name, scene, host, draft });
     }
     for (const { name, scene, host, draft } of shown) {

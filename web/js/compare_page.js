@@ -4,7 +4,7 @@ import { get, schema } from "./api.js";
 import { differing, numbers, partings, spectra } from "./compare_view.js";
 import { faults, fill, h, help, hint, panel } from "./dom.js";
 import { plot } from "./plot.js";
-import { place, unitOf } from "./scene_form.js";
+import { place, unitOf } from "./form/place.js";
 import { extent, latest, lesson, told } from "./study_bits.js";
 import { brief, number, quantity, title, words } from "./units.js";
 

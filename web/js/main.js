@@ -13,7 +13,7 @@ import { UnitsMenu } from "./ui/units_menu.js";
 // leave()?}: for a new query on the same path (false: show it anew), for other units (without it: show it anew), and for the end,
 // when `signal` is aborted.
 const pages = {
-  scene: () => import("./scene_page.js"),
+  scene: () => import("./scene/page.js"),
   jobs: () => import("./runs/runs.js"),
   job: () => import("./runs/run.js"),
   result: () => import("./result/page.js"),

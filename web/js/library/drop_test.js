@@ -2,8 +2,8 @@
 // as the next revision.
 import { go, link } from "../address.js";
 import { ask, post, schema as schemaNamed } from "../api.js";
-import { makeDraft } from "../draft.js";
-import { focusField } from "../form.js";
+import { makeDraft } from "../form/draft.js";
+import { focusField } from "../form/form.js";
 import { Loaded, Notice, Panel } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";

@@ -1,42 +1,31 @@
 // Forms by a schema that are sent as a whole, and those that change a material.
 import { swap } from "../address.js";
 import { post, schema as schemaNamed } from "../api.js";
-import { makeDraft } from "../draft.js";
-import { focusField, form } from "../form.js";
-import { place } from "../scene_form.js";
+import { makeDraft, useNews } from "../form/draft.js";
+import { focusField, Form } from "../form/form.js";
+import { place } from "../form/place.js";
 import { Failure, faultText, Loaded, Notice } from "../ui/controls.js";
-import { html, render, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { title } from "../units.js";
 import { Differences, path, readMaterial } from "./format.js";
 
-// A component as a widget of a form: drawn again when the draft changes, until the draft's page is left.
+// A component as a widget of a form: drawn again with each of the draft's news.
 export const widgetOf = (Component) =>
-  function widget({ pointer, schema, label, draft }) {
-    const element = document.createElement("div");
-    const refresh = () =>
-      render(
-        html`<${Component} pointer=${pointer} schema=${schema} label=${label} draft=${draft} />`,
-        element,
-      );
-    draft.signal?.addEventListener("abort", () => render(null, element));
-    return { element, refresh };
+  function Widget(context) {
+    useNews(context.draft);
+    return html`<${Component} ...${context} />`;
   };
+
+const isUsual = (pointer) => /^.(restitution|contact_time|comment)$/.test(pointer);
 
 // The fields of a schema over a draft; `onReady(element)` is called once they are there.
 export function Fields({ schema, draft, onReady, ...options }) {
   const box = useRef(null);
-  useEffect(() => {
-    const { leave } = form(box.current, {
-      schema,
-      draft,
-      shows: (pointer) => /^.(restitution|contact_time|comment)$/.test(pointer),
-      ...options,
-    });
-    onReady?.(box.current);
-    return leave;
-  }, [schema, draft]);
-  return html`<div ref=${box}></div>`;
+  useLayoutEffect(() => onReady?.(box.current), [schema, draft]);
+  return html`<div ref=${box}>
+    <${Form} schema=${schema} draft=${draft} shows=${isUsual} ...${options} />
+  </div>`;
 }
 
 // The faults of a refusal, each with a button to its field.
@@ -67,7 +56,7 @@ const focusFault = (box) =>
   requestAnimationFrame(() => box.querySelector("[aria-invalid=true]")?.focus());
 
 // A form by a schema: send(value) when it is submitted; what it rejects with is shown, as is what it returns (a view).
-// `isFocused` gives the button the focus. Further options are form()'s.
+// `isFocused` gives the button the focus. Further options are Form's.
 export function SchemaForm({ schema, value, label, send, isFocused, signal, ...options }) {
   const draft = useMemo(() => makeDraft(structuredClone(value), signal), []);
   const box = useRef(null);

@@ -1,5 +1,6 @@
 // The drawing of a scene that is edited, with its handles, as wide as there is room.
-import { html, render, useRef, useState } from "../ui/preact.js";
+import { html, useRef, useState } from "../ui/preact.js";
+import { useNews } from "../form/draft.js";
 import { Picture, useRoom } from "./drawing.js";
 import { Handles } from "./handles.js";
 import { layoutOf } from "./layout.js";
@@ -7,6 +8,7 @@ import { modelOf, MOST } from "./model.js";
 
 // While something is dragged the scale stays what it was.
 export function SceneDrawing({ draft, history }) {
+  useNews(draft);
   const box = useRef(null);
   const width = useRoom(box);
   const [fixed, setFixed] = useState(null);
@@ -27,8 +29,3 @@ export function SceneDrawing({ draft, history }) {
     </p>
   </div>`;
 }
-
-export const drawing = (host, draft, history) => ({
-  show: () => render(html`<${SceneDrawing} draft=${draft} history=${history} />`, host),
-  leave: () => render(null, host),
-});

@@ -1,5 +1,5 @@
 // What a scene states, place by place: every number, word and list with its label and its unit by the schema.
-import { place } from "../scene_form.js";
+import { place } from "../form/place.js";
 import { title } from "../units.js";
 
 const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);

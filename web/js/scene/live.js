@@ -1,5 +1,5 @@
 // The scene as it is edited, running: sliders for what matters most, the damper's effect, and the motion as it changes.
-import { html, render, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
+import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { IconButton } from "../ui/controls.js";
 import { number, quantity } from "../units.js";
@@ -103,7 +103,7 @@ function effectText({ summary }) {
   return parts.join(", ");
 }
 
-function Live({ draft, history, signal }) {
+export function Live({ draft, history, signal }) {
   const [, redraw] = useReducer((count) => count + 1, 0);
   const [answer, setAnswer] = useState({ data: null, error: null, channels: [], damper: null });
   const [bare, setBare] = useState(null);
@@ -206,10 +206,4 @@ function Live({ draft, history, signal }) {
       />`
     }
   </section>`;
-}
-
-// Shows the live view in `host` until the signal ends it.
-export function showLive(host, draft, history, signal) {
-  render(html`<${Live} draft=${draft} history=${history} signal=${signal} />`, host);
-  signal.addEventListener("abort", () => render(null, host));
 }
