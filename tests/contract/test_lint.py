@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A linter of OpenAPI 3.1 finds no error in schema/openapi.json, and the dashboard is written as prettier writes it.
+"""A linter of OpenAPI 3.1 finds no error in schema/openapi.json, and the dashboard's code keeps its rules.
 
 Both are installed by npm into the build folder, once; without npm or its network the tests are skipped."""
 
@@ -92,6 +92,24 @@ def test_the_dashboard_is_formatted():
     done = subprocess.run([installed(FORMATTER, "prettier"), "--check", *parts], cwd=folder, capture_output=True, text=True,
                           timeout=200, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_dashboards_code_keeps_its_rules():
+    """No ternary stands directly within another, no assignment within an expression; both are found where they are planted."""
+    rules = [shutil.which("node"), os.path.join(program.SOURCE, "tests", "contract", "code_rules.mjs"),
+             os.path.join(os.path.dirname(os.path.dirname(installed(FORMATTER, "prettier"))), "prettier")]
+    folder = os.path.join(program.SOURCE, "web", "js")
+    modules = sorted(os.path.join(folder, part, name) for part in os.listdir(folder) if os.path.isdir(os.path.join(folder, part))
+                     for name in os.listdir(os.path.join(folder, part)))
+    assert len(modules) > 30, modules
+    done = subprocess.run([*rules, *modules], capture_output=True, text=True, timeout=200, check=True)
+    assert done.stdout == "", done.stdout
+    planted = os.path.join(program.build, "planted.mjs")
+    with open(planted, "w", encoding="utf-8") as file:
+        file.write("let a = 1;\nexport const b = a ? 1 : a > 2 ? 3 : 4;\nfor (a = 0; a < 2; a = a + 1);\nexport const c = () => (a = 2);\n")
+    done = subprocess.run([*rules, planted], capture_output=True, text=True, timeout=200, check=True)
+    found = [line.removeprefix(planted) for line in done.stdout.splitlines()]
+    assert found == [":2: a ternary within another", ":4: an assignment within an expression"], found
 
 
 if __name__ == "__main__":

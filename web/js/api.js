@@ -15,7 +15,9 @@ let signIn = null; // () -> a promise of whether there is a token now
 export const token = () => sessionStorage.getItem(KEY);
 export const setToken = (text) => sessionStorage.setItem(KEY, text);
 export const session = createStore(0); // counts tokens given by hand: what was refused before is tried again
-export const onUnauthorised = (asks) => (signIn = asks);
+export function onUnauthorised(asks) {
+  signIn = asks;
+}
 
 const home = new URL(".", document.baseURI);
 export const address = (path) => new URL(path, home).href;
@@ -47,7 +49,9 @@ async function send(method, path, { json, body, type, headers, query, signal }) 
 }
 
 let shown = null; // until this is aborted somebody reads the page that asks
-export const readUntil = (signal) => (shown = signal);
+export function readUntil(signal) {
+  shown = signal;
+}
 
 // One exchange; a Refusal where the answer is none. Options: json (a body), body and type (another one), headers, query
 // (null leaves one out), signal: once it is aborted there is no answer, but what writes is sent whole.

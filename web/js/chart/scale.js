@@ -40,11 +40,18 @@ function linearTicks([low, high], most) {
   return ticks;
 }
 
+// Ticks of a decade by how many have room.
+const DECADES = [
+  [9, [1, 2, 3, 4, 5, 6, 7, 8, 9]],
+  [3, [1, 2, 5]],
+  [-Infinity, [1]],
+];
+
 // At 1 to 9 of a decade, at 1, 2 and 5, or at some powers of ten, as there is room.
 function logTicks([low, high], most) {
   const decades = Math.log10(high / low);
   const room = most / Math.max(0.3, decades); // ticks in a decade
-  const digits = room >= 9 ? [1, 2, 3, 4, 5, 6, 7, 8, 9] : room >= 3 ? [1, 2, 5] : [1];
+  const [, digits] = DECADES.find(([least]) => room >= least);
   const every = Math.max(1, Math.ceil(1 / room));
   const ticks = [];
   for (let power = Math.floor(Math.log10(low)); 10 ** power <= high; power++)

@@ -127,7 +127,9 @@ function Import({ onDone }) {
       if (problem.name !== "AbortError") setError(problem);
     }
   };
-  const forget = (event) => (event.currentTarget.value = ""); // the same file may come again
+  const forget = (event) => {
+    event.currentTarget.value = ""; // the same file may come again
+  };
   return html`<label
       >A table (CSV) with slug, name, restitution and source, or an export (JSON)
       <input type="file" accept=".csv,.json" onClick=${forget} onChange=${read} />

@@ -107,7 +107,9 @@ export function TraceField({ pointer, schema, label, draft }) {
       draft.say(draft.check, [{ pointer, detail: error.message }]);
     }
   };
-  const forget = (event) => (event.currentTarget.value = "");
+  const forget = (event) => {
+    event.currentTarget.value = "";
+  };
   return html`<div class="field">
       <label for=${id.current}
         >${label}<span class="unit">${` [${pretty(schema["x-unit"])}]`}</span></label

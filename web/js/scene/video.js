@@ -67,7 +67,7 @@ export async function record({ svg, seconds, pose, onProgress, signal }) {
   const recorder = new MediaRecorder(track, { mimeType: typeHere(), videoBitsPerSecond: 6e6 });
   const chunks = [];
   recorder.ondataavailable = ({ data }) => data.size > 0 && chunks.push(data);
-  const ended = new Promise((resolve) => (recorder.onstop = resolve));
+  const ended = new Promise((resolve) => recorder.addEventListener("stop", resolve));
   const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
   let waited = 0; // ms in which the film stood still
   const textAt = async (second) => {

@@ -20,11 +20,8 @@ export function Bars({ title, description, x, rows, origin = 0, log = false }) {
       const b = across.to(row.to);
       const start = Math.min(a, b);
       const isLow = row.to < (row.from ?? origin);
-      const outer = row.interval
-        ? across.to(isLow ? row.interval[0] : row.interval[1])
-        : isLow
-          ? start
-          : Math.max(a, b);
+      const [first, last] = row.interval ? row.interval.map(across.to) : [start, Math.max(a, b)];
+      const outer = isLow ? first : last;
       const isFlipped = isLow ? outer - 60 < left : outer + 60 > right;
       const anchor = isLow === isFlipped ? "start" : "end";
       return html`<g class="hbar" style=${{ "--ink": `var(--${row.color ?? "accent"})` }}>

@@ -21,12 +21,10 @@ export function normal(x) {
   return x > 0 ? 1 - tail : tail;
 }
 
-const measureText = ({ period, measure }) =>
-  period
-    ? `Spectral acceleration at ${quantity(period, "s")}`
-    : measure && measure !== "pga"
-      ? title(measure)
-      : "Peak ground acceleration";
+function measureText({ period, measure }) {
+  if (period) return `Spectral acceleration at ${quantity(period, "s")}`;
+  return measure && measure !== "pga" ? title(measure) : "Peak ground acceleration";
+}
 
 // Of each level the part of the records whose metric exceeds the limit.
 function observed(curves, { metric, value }) {

@@ -9,6 +9,7 @@ import { Table } from "../ui/table.js";
 import { quantity, title } from "../units.js";
 import { Decision, memberName, sentence } from "./parts.js";
 
+const STABLE = { true: "yes", false: "no" };
 const METRICS = ["peak_displacement", "rms_displacement"];
 
 // Points of one branch and one kind as a line; a gap (NaN) parts it from the next. A line goes on to the first point of the
@@ -130,7 +131,7 @@ function Points({ points, unit, name }) {
     { label: "Impacts a period", isNumeric: true, value: (one) => one.impacts_per_period },
     {
       label: "Stable",
-      value: ({ period, stable }) => (period ? (stable ? "yes" : "no") : null),
+      value: ({ period, stable }) => (period ? STABLE[stable] : null),
     },
     { label: "Peak displacement", unit: "m", value: (one) => one.peak_displacement },
     { label: "Without dampers", unit: "m", value: (one) => one.undamped_peak_displacement },

@@ -76,11 +76,8 @@ export function Table({
   );
   const textOf = (column, row, at) => {
     const value = column.value(row);
-    return formats[at] && isNumber(value)
-      ? formats[at].write(value)
-      : isMissing(value)
-        ? "–"
-        : String(value);
+    if (formats[at] && isNumber(value)) return formats[at].write(value);
+    return isMissing(value) ? "–" : String(value);
   };
   const wanted = words.toLowerCase().split(/\s+/).filter(Boolean);
   const matches = (row) => {
