@@ -4,54 +4,88 @@ import { axe, leads, says, test, transferred } from "./support.mjs";
 
 const pair = async (daemon) => [await daemon.run("paper_free_sponge"), await daemon.run("paper_free_aluminium")].map((job) => job.result);
 
-test("The last two runs, sponge and aluminium, are compared: force, time and what differs are told", async ({ page, daemon, url }) => {
+test("The last two runs, sponge and aluminium, are compared: force, time and what differs are stated", async ({ page, daemon, url }) => {
   const ids = await pair(daemon);
   await page.goto(url("#/compare"));
   await leads(page, /compare\?a=r-\w+&b=r-\w+/);
   await page.goto(url(`#/compare?a=${ids[0]}&b=${ids[1]}`));
   const page1 = page.getByRole("main");
-  await says(page1, /B aluminium@1 pushes 70 times as hard as A sponge@1 \(401 N against 5\.72 N\)/);
+  await says(page1, /B aluminium moves 3\.8 % less than A sponge \(rms 2\.48 mm against 2\.58 mm\)/);
+  await says(page1, /B aluminium pushes 70 times as hard as A sponge \(401 N against 5\.72 N\)/);
   await says(page1, /83 times as long over a contact \(25 ms against 300 µs\)/);
-  await says(page.getByRole("table", { name: "Inputs that differ" }), /Damper 1, buffer, contact time\s+25 ms\s+300 µs/);
+  await says(page.getByRole("table", { name: "Inputs that differ" }), /Damper 1, buffer, contact time \[ms\]\s+25\s+0\.3/);
   assert.doesNotMatch(await page.getByRole("table", { name: "Inputs that differ" }).innerText(), /clearance|stiffness/);
+  await says(page.getByRole("table", { name: "First impacts" }), /Peak force \[N\]\s+3\.8\s+291\.0/);
   await page.getByRole("application", { name: "Spectrum of the mean acceleration" }).waitFor();
-  await says(page1, /Apart from A sponge@1 by 1 % of the largest displacement: B aluminium@1 from 47 ms on\./);
+  await says(page1, /Apart from A sponge by 1 % of the largest displacement: B aluminium from 47 ms on\./);
   // By how much the densities about 500 Hz differ, from the service's own numbers.
   const [a, b] = await Promise.all(ids.map((id) => daemon.get(`/v1/results/${id}/psd.json`)));
   const power = ({ frequency, channels }) => frequency.values.reduce((sum, at, k) =>
     sum + (at > 447 && at < 562 ? channels.mean_acceleration.values[k] : 0), 0);
-  await says(page1, new RegExp(`Apart from A sponge@1: B aluminium@1 by 14 dB, most around 500 Hz: ${
-    Math.round(10 * Math.log10(power(b) / power(a)))} dB more`));
+  const level = Math.round(10 * Math.log10(power(b) / power(a)));
+  await says(page1, new RegExp(`Apart from A sponge: B aluminium by 14 dB, most around 500 Hz: ${level} dB more`));
+  await page.getByRole("button", { name: "Numbers: Level difference by third octaves" }).click();
+  await says(page.getByRole("region", { name: "Numbers of Level difference by third octaves" }), new RegExp(`50\\d\\.\\d+\\s+${level - 1}?\\d*`));
   assert.deepEqual(await axe(page), []);
+});
+
+test("From a fresh dashboard sponge against aluminium takes 3 clicks from the scene, 2 from the page of comparisons", async ({ page, daemon, url }) => {
+  for (const job of (await daemon.get("/v1/jobs?limit=100")).jobs) await fetch(`${daemon.url}/v1/jobs/${job.id}?purge=1`, { method: "DELETE" });
+  await page.goto(url("#/scene"));
+  await page.getByRole("button", { name: "Run", exact: true }).click();
+  await page.getByRole("button", { name: "Compare with …" }).click();
+  await page.getByRole("button", { name: "Aluminium", exact: true }).click();
+  await leads(page, /compare\?a=r-\w+&b=r-\w+/);
+  await says(page.getByRole("main"), /B aluminium pushes 70 times as hard as A sponge/);
+  for (const job of (await daemon.get("/v1/jobs?limit=100")).jobs) await fetch(`${daemon.url}/v1/jobs/${job.id}?purge=1`, { method: "DELETE" });
+  await page.goto(url("#/records"));
+  await page.getByRole("navigation").getByRole("link", { name: "Compare" }).click();
+  await page.getByRole("button", { name: "Sponge against aluminium" }).click();
+  await says(page.getByRole("main"), /B aluminium pushes 70 times as hard as A sponge/);
+});
+
+test("The difference over time is that of the samples, and a legend hides and isolates", async ({ page, daemon, url }) => {
+  const ids = await pair(daemon);
+  await page.goto(url(`#/compare?a=${ids[0]}&b=${ids[1]}&from=0&to=1`));
+  const chart = page.getByRole("figure", { name: "Difference over time" });
+  await chart.getByRole("button", { name: "Numbers: Difference over time" }).click();
+  const [a, b] = await Promise.all(ids.map((id) => daemon.get(`/v1/results/${id}/series.json?channels=displacement&from=0.4&to=0.4`)));
+  const difference = b.channels.displacement.values[0] - a.channels.displacement.values[0];
+  const row = page.getByRole("region", { name: "Numbers of Difference over time" }).getByRole("row", { name: /^0\.4\s/ });
+  const text = await row.innerText();
+  const power = { "⁻⁴": 1e-4, "⁻⁵": 1e-5 };
+  const [, digits, exponent] = /\s(−?[\d.]+)(?: × 10(⁻.))?$/.exec(text);
+  assert.ok(Math.abs(Number(digits.replace("−", "-")) * (power[exponent] ?? 1) - difference) < 1e-8, `${text} is ${difference}`);
+  const motion = page.getByRole("figure", { name: "Over time", exact: true });
+  await motion.getByRole("button", { name: "B aluminium" }).click({ modifiers: ["Shift"] });
+  assert.equal(await motion.getByRole("button", { name: "A sponge" }).getAttribute("aria-pressed"), "false");
+  await motion.getByRole("button", { name: "A sponge" }).click();
+  assert.equal(await motion.getByRole("button", { name: "A sponge" }).getAttribute("aria-pressed"), "true");
 });
 
 test("The window of time is in the URL, finer data is little, and back shows the whole again", async ({ page, daemon, url }) => {
   const [a, b] = await pair(daemon);
   await page.goto(url(`#/compare?a=${a}&b=${b}`));
-  const chart = page.getByRole("application", { name: "Over time" });
+  const chart = page.getByRole("application", { name: "Over time", exact: true });
   await chart.waitFor();
   await chart.focus();
   const { bytes } = await transferred(page, async () => {
-    await page.keyboard.press("ArrowRight");
     await page.keyboard.press("+");
-    await leads(page, /from=0&to=5/);
+    await leads(page, /from=[\d.]+&to=[\d.]+/);
   });
-  assert.ok(bytes > 0 && bytes < 200000, `${bytes} bytes`);
-  await says(page.getByRole("main"), /From 0 s to 5 s/);
+  assert.ok(bytes < 200000, `${bytes} bytes`);
+  await says(page.getByRole("main"), /Whole/);
   await page.goBack();
-  await says(page.getByRole("main"), /From 0 s to 10 s/);
+  await leads(page, /compare\?a=r-\w+&b=r-\w+$/);
 });
 
-test("By keyboard a result is added and taken out", async ({ page, daemon, url }) => {
+test("A result is added and taken out", async ({ page, daemon, url }) => {
   const [a, b] = await pair(daemon);
   await page.goto(url(`#/compare?a=${a}`));
-  const second = page.getByRole("combobox", { name: "B", exact: true });
-  await second.selectOption(b);
-  await page.getByRole("button", { name: "Compare" }).press("Enter");
+  await page.getByRole("combobox", { name: "Add a result" }).selectOption(b);
   await leads(page, new RegExp(`b=${b}`));
   await says(page.getByRole("main"), /70 times as hard/);
-  await second.selectOption("none");
-  await page.getByRole("button", { name: "Compare" }).press("Enter");
+  await page.getByRole("button", { name: "Take B aluminium out" }).press("Enter");
   await leads(page, /compare\?a=r-\w+$/);
 });
 
@@ -60,9 +94,9 @@ test("What has no force of an impact is compared too: the impulse model, and a s
   const impulse = await daemon.run("paper_free_sponge", { contact: { model: "impulse" } });
   const rest = await daemon.run("paper_free_sponge", { excitation: { kind: "free" } });
   await page.goto(url(`#/compare?a=${sponge}&b=${impulse.result}&c=${rest.result}`));
-  await says(page.getByRole("main"), /B impulse from 46 ms on/);
+  await says(page.getByRole("main"), /B impulse[^.]* from 46 ms on/);
   await says(page.getByRole("table", { name: "Numbers that differ" }), /Impacts\s+22\s+30[^]*0 ×/);
-  await says(page.getByRole("figure", { name: "Over time" }), /A \S+ between −12\.89 mm and 15 mm/);
+  await says(page.getByRole("figure", { name: "Over time", exact: true }), /A [^;]* between −12\.89 mm and 15 mm/);
 });
 
 test("Contact models of a scene: what the impulse model makes of its spectrum", async ({ page, daemon, url }) => {
@@ -74,12 +108,12 @@ test("Contact models of a scene: what the impulse model makes of its spectrum", 
   await says(page.getByRole("row", { name: /^impulse/ }), /2\.692 mm\s+\+4\.2 %[^]*16\.17 dB\s+46 ms/);
 });
 
-test("A result that is not there is told, and the page goes on", async ({ page, daemon, url, refused }) => {
+test("A result that is not there is named, and the page goes on", async ({ page, daemon, url, refused }) => {
   refused(404);
   const [a, b] = await pair(daemon);
   await page.goto(url(`#/compare?a=${a}&b=r-none`));
   await page.getByRole("alert").waitFor();
-  await page.getByRole("combobox", { name: "B", exact: true }).selectOption(b);
-  await page.getByRole("button", { name: "Compare" }).press("Enter");
+  await page.getByRole("button", { name: "Take B r-none out" }).click();
+  await page.getByRole("combobox", { name: "Add a result" }).selectOption(b);
   await says(page.getByRole("main"), /70 times as hard/);
 });

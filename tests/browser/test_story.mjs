@@ -30,10 +30,10 @@ test("From the first sight to why the sponge beats aluminium: run, zoom to an im
   const [, aluminium] = await until("another result", () => RESULT.exec(page.url())?.[1] !== sponge && RESULT.exec(page.url()));
   await says(main(page), /Largest force[^]*401/);
   // Side by side.
-  await page.getByRole("link", { name: "Compare with …" }).click();
+  await page.getByRole("button", { name: /^Compare with/ }).click();
+  await page.getByRole("link", { name: "An earlier run …" }).click();
   await leads(page, new RegExp(`compare\\?a=${aluminium}`));
-  await page.getByRole("combobox", { name: "B", exact: true }).selectOption(sponge);
-  await page.getByRole("button", { name: "Compare", exact: true }).click();
+  await page.getByRole("combobox", { name: "Add a result" }).selectOption(sponge);
   await leads(page, new RegExp(`b=${sponge}`));
   await says(main(page), /70[\d.]* times as/);
   await says(main(page), /Peak acceleration[\s\S]*0\.0331 ×/);
@@ -72,10 +72,11 @@ test("By keyboard alone: run, look at another impact, zoom and back, play, downl
   assert.match((await saved).suggestedFilename(), /csv$/);
   await page.keyboard.press("Control+Home");
   await page.evaluate(() => document.activeElement.blur());
-  await press(page.getByRole("link", { name: "Compare with …" }));
+  await press(page.getByRole("button", { name: /^Compare with/ }));
+  await press(page.getByRole("link", { name: "An earlier run …" }));
   await leads(page, /#\/compare\?a=/);
   await page.getByRole("heading", { name: "Compare", level: 1 }).waitFor();
-  await press(page.getByRole("combobox", { name: "B", exact: true }), "ArrowDown");
+  await tabTo(page, page.getByRole("combobox", { name: "Add a result" }));
   await page.evaluate(() => document.activeElement.blur());
   await press(page.getByRole("navigation").getByRole("link", { name: "Records" }));
   await leads(page, /#\/records/);

@@ -6,6 +6,7 @@ import { Failure, Loaded, Notice, Panel, Tabs } from "../ui/controls.js";
 import { useLoaded, useStore } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
 import { Animation } from "./animation.js";
+import { CompareMenu } from "./compare_menu.js";
 import { ResultContext, useResultContext } from "./context.js";
 import { Energy } from "./energy.js";
 import { Files } from "./files.js";
@@ -112,7 +113,7 @@ function ResultPage({ address, signal }) {
           <a class="button primary" href=${link("scene", { result: loaded.data.id })}
             >Change this scene</a
           >
-          <a class="button" href=${link("compare", { a: loaded.data.id })}>Compare with …</a>
+          <${CompareMenu} key=${loaded.data.id} result=${loaded.data} />
           <a class="button" href=${link(`results/${loaded.data.id}/report`)}>Report</a>
           ${hasStudies && html`<${StudyButtons} scene=${loaded.data.scene} onChoose=${setChosen} />`}
         </div>`

@@ -27,14 +27,14 @@ const plainName = (scene) => `${materialOf(scene)}, ${words(scene.excitation?.ki
 
 // A name for each of {scene, title}: by the inputs that vary among them, else by what they are. Without a title the material
 // comes first.
-function differingNames(jobs, schema) {
+export function differingNames(jobs, schema, mostParts = MOST_PARTS) {
   const scenes = jobs.map(({ scene }) => scene ?? {});
   const inputs = varyingInputs(scenes, schema);
   return jobs.map(({ scene, title }, at) => {
     if (!scene) return null;
     const parts = inputs
-      .filter(({ values }) => values[at] !== undefined && values[at] !== null)
-      .slice(0, MOST_PARTS)
+      .filter(({ values }) => (values[at] ?? null) !== null && values[at] !== "auto")
+      .slice(0, mostParts)
       .map((input) => partText(input, input.values[at]));
     if (!title && parts.length > 0 && !inputs.some(({ label }) => label === "material"))
       parts.unshift(materialOf(scene));

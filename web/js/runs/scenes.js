@@ -5,8 +5,8 @@ import { quantity, words } from "../units.js";
 const LEFT_OUT = /^\/(output|study|title|labels)\b/;
 const SECTIONS = [
   "dampers",
-  "excitation",
   "contact",
+  "excitation",
   "structure",
   "duration",
   "accuracy",

@@ -1,0 +1,77 @@
+// "Compare with …": the same scene with one thing changed is run, and both results are shown beside each other.
+import { go, link } from "../address.js";
+import { follow, get, submit } from "../api.js";
+import { Button, Failure, Menu } from "../ui/controls.js";
+import { html, useState } from "../ui/preact.js";
+import { useLoaded } from "../ui/store.js";
+
+const MOST_MATERIALS = 30;
+
+const plain = ({ study, title, labels, ...scene }) => scene;
+const usedBy = (scene) =>
+  scene.dampers
+    .flatMap(({ buffer, left_buffer: left, right_buffer: right }) => [buffer, left, right])
+    .map((buffer) => buffer?.material?.replace(/@.*/, ""));
+
+// The scene with every stop of this material.
+const withMaterial = (slug) => (scene) => ({
+  ...scene,
+  dampers: scene.dampers.map(({ left_buffer: left, right_buffer: right, buffer, ...damper }) => ({
+    ...damper,
+    buffer: slug,
+  })),
+});
+
+const withContact = (model) => (scene) => ({ ...scene, contact: { ...scene.contact, model } });
+
+// {label, change(scene)} for this scene.
+function choicesOf(scene, plan, materials) {
+  if (scene.dampers.length === 0) return [];
+  const used = usedBy(scene);
+  const isImpulse = plan.contact_model === "impulse";
+  return [
+    ...materials
+      .filter(
+        ({ slug, restitution, status }) =>
+          restitution !== null && status !== "deprecated" && !used.includes(slug),
+      )
+      .slice(0, MOST_MATERIALS)
+      .map(({ slug, name }) => ({ label: name, change: withMaterial(slug) })),
+    { label: "No damper", change: (whole) => ({ ...whole, dampers: [] }) },
+    {
+      label: isImpulse ? "Contacts that last" : "Contacts without duration",
+      change: withContact(isImpulse ? "spring_damper" : "impulse"),
+    },
+  ];
+}
+
+export function CompareMenu({ result }) {
+  const [state, setState] = useState({});
+  const { scene, plan, id } = result;
+  const hasDamper = scene.dampers.length > 0;
+  const loaded = useLoaded(
+    async (signal) =>
+      hasDamper ? (await get("v1/materials", { limit: 200 }, signal)).materials : [],
+    [id],
+  );
+  const choices = choicesOf(scene, plan, loaded.data ?? []);
+  const run = async ({ label, change }) => {
+    setState({ running: label });
+    try {
+      const job = await submit(change(plain(scene)));
+      const end = job.finished ? job : await follow(job, () => {});
+      if (end.status !== "successful")
+        throw Object.assign(new Error("The run failed"), end.problem);
+      go("compare", { a: id, b: end.result });
+    } catch (error) {
+      if (error.name !== "AbortError") setState({ error });
+    }
+  };
+  if (state.running)
+    return html`<span class="quiet" role="status">${`Running with ${state.running} …`}</span>`;
+  return html`<${Menu} label="Compare with …">
+      ${choices.map((choice) => html`<${Button} isQuiet onClick=${() => void run(choice)}>${choice.label}<//>`)}
+      <a class="menu-link" href=${link("compare", { a: id })}>An earlier run …</a>
+    <//>
+    ${state.error && html`<${Failure} error=${state.error} />`}`;
+}

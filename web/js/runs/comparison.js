@@ -1,0 +1,321 @@
+// Results beside each other: what differs in words, their motions with the difference, their spectra, metrics, inputs and first
+// impacts. In the address: channel, from, to.
+import { html, useEffect, useMemo, useState } from "../ui/preact.js";
+import { Chart } from "../chart/chart.js";
+import { Choice, Failure, Panel } from "../ui/controls.js";
+import { useLoaded } from "../ui/store.js";
+import { loadSeries, seriesOf, timeOfEnergy } from "../result/series.js";
+import { number, quantity, title, words } from "../units.js";
+import { bandDifferences, bandSeries, furthestBand } from "./bands.js";
+import { ComparisonTable } from "./comparison_table.js";
+
+const PIXELS = 1600; // buckets of a long series
+const QUIET_PART = 0.7; // motions that die before this part of the run are shown until then
+
+// Which of two pushes harder, and why.
+function pushText(runs) {
+  const force = ({ result }) => result.summary.peak_contact_force;
+  const contact = ({ result }) =>
+    Math.max(...result.plan.derived.map((stop) => stop.contact_time ?? 0));
+  const [soft, hard] = runs.toSorted((a, b) => force(a) - force(b));
+  const ratio = (a, b, unit) =>
+    `${number(a / b, 2)} times as %s (${quantity(a, unit, 3)} against ${quantity(b, unit, 3)})`;
+  if (!(force(soft) > 0 && force(hard) > 1.05 * force(soft))) return null;
+  const harder = ratio(force(hard), force(soft), "N").replace("%s", `hard as ${soft.label}`);
+  const isLonger = contact(soft) > 1.05 * contact(hard) && contact(hard) > 0;
+  const longer = ratio(contact(soft), contact(hard), "s").replace("%s", "long over a contact");
+  return `${hard.label} pushes ${harder}${isLonger ? `, for ${soft.label} takes ${longer}` : ""}.`;
+}
+
+// How much more or less one moves than the first.
+function motionText(first, other) {
+  const [a, b] = [first, other].map(({ result }) => result.summary.rms_displacement);
+  if (!(a > 0) || Math.abs(b / a - 1) < 0.005) return null;
+  const change = `${number(Math.abs(100 * (b / a - 1)), 2)} % ${b > a ? "more" : "less"}`;
+  return `${other.label} moves ${change} than ${first.label} (rms ${quantity(b, "m", 3)} against ${quantity(a, "m", 3)}).`;
+}
+
+const divergenceOf = (pair) => ((pair.divergence?.time ?? null) === null ? null : pair.divergence);
+
+function partingText([first, ...others], pairs) {
+  const parts = others.flatMap((run, at) => {
+    const divergence = divergenceOf(pairs[at]);
+    if (!divergence) return [];
+    const rounding = divergence.is_trusted ? "" : " (or by rounding)";
+    return `${run.label} from ${quantity(divergence.time, "s")} on${rounding}`;
+  });
+  return parts.length > 0
+    ? `Apart from ${first.label} by 1 % of the largest displacement: ${parts.join(", ")}.`
+    : null;
+}
+
+function Lesson({ runs, pairs }) {
+  const [first, ...others] = runs;
+  const texts = [
+    ...others.map((other) => motionText(first, other)),
+    ...others.map((other) => pushText([first, other])),
+    partingText(runs, pairs),
+  ].filter(Boolean);
+  return html`<div class="decision">
+    ${texts.map((text, at) => html`<p class=${at === 0 ? "answer" : null}>${text}</p>`)}
+  </div>`;
+}
+
+// b - a at a's samples; b lies between its own on a line.
+function differenceOf(a, b) {
+  const [values, others] = [a.column.values, b.column.values];
+  if (!values || !others || others.length < 2) return null;
+  const step = b.time[1] - b.time[0];
+  const difference = Array.from(a.time, (time, at) => {
+    const place = (time - b.time[0]) / step;
+    const low = Math.floor(place + 1e-9);
+    if (low < 0 || low >= others.length) return null;
+    const next = others[Math.min(others.length - 1, low + 1)];
+    return others[low] + Math.max(0, place - low) * (next - others[low]) - values[at];
+  });
+  return { x: a.time, y: difference };
+}
+
+// The series of one channel of each run: [{run, time, column}].
+function useMotions(runs, channel, window) {
+  const isWhole = runs.every(({ result }) => result.count <= 50000);
+  return useLoaded(
+    (signal) =>
+      Promise.all(
+        runs
+          .filter((run) => run.end > window.from)
+          .map(async (run) => {
+            const { path, result, end } = run;
+            const within = { from: window.from, to: Math.min(window.to, end) };
+            const options = { path, result, channels: [channel], window: within };
+            const { time, columns } = await loadSeries({ ...options, pixels: PIXELS, signal });
+            return { run, time, column: columns.get(channel) };
+          }),
+      ),
+    [runs, channel, ...(isWhole ? [] : [window.from, window.to])],
+  );
+}
+
+function Motions({ runs, pairs, query, change }) {
+  const channels = runs[0].result.channels.filter((channel) =>
+    runs.every(({ result }) => result.channels.includes(channel)),
+  );
+  const channel = channels.includes(query.channel) ? query.channel : channels[0];
+  const end = Math.max(...runs.map((run) => run.end));
+  const given = [Number(query.from ?? 0), Number(query.to ?? end)];
+  const isGiven = query.from !== undefined || query.to !== undefined;
+  const window = given[0] < given[1] ? { from: given[0], to: given[1] } : { from: 0, to: end };
+  const loaded = useMotions(runs, channel, window);
+  const [differences, quiet] = useMemo(() => {
+    const [first, ...others] = loaded.data ?? [];
+    const found = others.map((other) => ({ ...differenceOf(first, other), run: other.run }));
+    const until = (loaded.data ?? []).map(({ time, column }) =>
+      column.values ? 1.1 * timeOfEnergy(time, column.values) : end,
+    );
+    const last = Math.max(0, ...until);
+    return [
+      found.filter(({ x }) => x),
+      last > 0 && last < QUIET_PART * end ? Number(last.toPrecision(2)) : null,
+    ];
+  }, [loaded.data]);
+  if (channels.length === 0) return html`<p>They have no channel in common.</p>`;
+  const range = isGiven ? [window.from, window.to] : quiet && [0, quiet];
+  const setRange = (next) => {
+    const ends = next?.map((value) => Number(value.toPrecision(8)));
+    const whole = { from: quiet ? 0 : null, to: quiet ? end : null };
+    change(ends ? { from: ends[0], to: ends[1] } : whole, true);
+  };
+  const isFirst = loaded.data?.[0]?.run === runs[0];
+  const unit = runs[0].result.units[channel];
+  const rules = runs.slice(1).flatMap((run, at) => {
+    const divergence = divergenceOf(pairs[at]);
+    return divergence
+      ? [
+          {
+            x: divergence.time,
+            label: runs.length < 4 ? `${run.label} parts` : "",
+            color: run.color,
+          },
+        ]
+      : [];
+  });
+  const x = { label: "Time", unit: "s", domain: [0, end] };
+  const shared = { x, range, onRange: setRange, group: "comparison" };
+  return html`${channels.length > 1 && html`<p><${ChannelChoice} channels=${channels} channel=${channel} change=${change} /></p>`}
+  ${loaded.error && html`<${Failure} error=${loaded.error} />`}
+  ${
+    loaded.data
+      ? html`<${Chart}
+            ...${shared}
+            title="Over time"
+            y=${{ label: title(channel), unit }}
+            height=${250}
+            isCompact=${isFirst && differences.length > 0}
+            rules=${rules}
+            series=${loaded.data.map(({ run, time, column }) => seriesOf(run.label, run.color, time, column))}
+          />
+          ${
+            isFirst &&
+            differences.length > 0 &&
+            html`<${Chart}
+              ...${shared}
+              title="Difference over time"
+              y=${{ label: `Difference to ${runs[0].label}`, unit }}
+              height=${150}
+              series=${differences.map(({ run, x: time, y }) => ({ label: `${run.label} less ${runs[0].label}`, color: run.color, x: time, y }))}
+            />`
+          }
+          ${isFirst && differences.length === 0 && html`<p class="hint">Zoom in to see the difference.</p>`}`
+      : html`<p class="quiet">Loading …</p>`
+  }`;
+}
+
+const ChannelChoice = ({ channels, channel, change }) =>
+  html`<${Choice}
+    label="Channel"
+    options=${channels.map((value) => ({ value, label: words(value) }))}
+    value=${channel}
+    onChange=${(value) => change({ channel: value }, true)}
+  />`;
+
+function spectrumText(first, others, pairs) {
+  const parts = others.map(({ run, bands }) => {
+    const level = pairs[run.at - 1]?.psd?.[0]?.level;
+    const most = furthestBand(bands);
+    const there = most
+      ? `, most around ${quantity(most.frequency, "Hz", 2)}: ${number(Math.abs(most.level), 2)} dB ${most.level > 0 ? "more" : "less"}`
+      : "";
+    return `${run.label} by ${number(level, 2)} dB${there}`;
+  });
+  return `Apart from ${first.label}: ${parts.join("; ")}.`;
+}
+
+function Spectra({ runs, pairs }) {
+  const channel = pairs[0].psd?.[0]?.channel;
+  const [first, ...others] = useMemo(
+    () =>
+      runs
+        .map((run, at) => ({ ...run, at, density: run.psd?.channels[channel] }))
+        .filter(({ density }) => density)
+        .map((run) => ({ ...run, x: run.psd.frequency.values, y: run.density.values })),
+    [runs, channel],
+  );
+  if (!channel || others.length === 0 || first.at !== 0)
+    return html`<p>They have no spectrum in common.</p>`;
+  const levels = others.map((run) => ({ run, bands: bandDifferences(first, run) }));
+  const x = { label: "Frequency", unit: "Hz", log: true };
+  const bands = levels.flatMap((one) => one.bands);
+  const ends = [
+    Math.min(...bands.map(({ low }) => low)),
+    Math.max(...bands.map(({ high }) => high)),
+  ];
+  return html`<p>${spectrumText(first, levels, pairs)}</p>
+    <div class="columns">
+      <${Chart}
+        title=${`Spectrum of the ${words(channel)}`}
+        description=${spectrumText(first, levels, pairs)}
+        height=${220}
+        x=${x}
+        y=${{ label: "Density", unit: first.density.unit, log: true }}
+        series=${[first, ...others].map(({ label, color, x: at, y }) => ({ label, color, x: at, y }))}
+        group="spectra"
+      />
+      <${Chart}
+        title="Level difference by third octaves"
+        height=${220}
+        x=${{ ...x, domain: bands.length > 0 ? ends : undefined }}
+        y=${{ label: `Level over ${first.label}`, unit: "dB" }}
+        series=${levels.map(({ run, bands }) => bandSeries(run.label, run.color, bands))}
+        group="spectra"
+      />
+    </div>`;
+}
+
+// The push of each run's first impact, on scales that show both a blow and a push.
+function FirstImpacts({ runs }) {
+  const pushing = runs.filter(({ force }) => force && force.time.values.length > 2);
+  const rows = [
+    { label: "Start", unit: "s", of: (impact) => impact.start },
+    { label: "Approach speed", unit: "m/s", of: (impact) => impact.approach_speed },
+    { label: "Restitution", unit: "1", of: (impact) => impact.restitution },
+    { label: "Contact time", unit: "s", of: (impact) => impact.duration },
+    { label: "Peak force", unit: "N", of: (impact) => impact.peak_force },
+    { label: "Impulse", unit: "N s", of: (impact) => impact.impulse },
+    { label: "Energy lost", unit: "J", of: (impact) => impact.energy_lost },
+  ].map(({ label, unit, of }) => ({
+    label,
+    unit,
+    values: runs.map(({ impact }) => (impact ? of(impact) : null)),
+  }));
+  const series = pushing.map(({ label, color, force: { time, channels } }) => {
+    const forces = channels.contact_force.values;
+    const sign = Math.sign(forces[forces.length >> 2]);
+    return {
+      label,
+      color,
+      x: time.values.map((one) => one - time.values[0]),
+      y: forces.map((force) => force * sign),
+    };
+  });
+  const lasts = series.map(({ x }) => x[x.length - 1]);
+  return html`<div class="columns">
+    ${
+      series.length > 0 &&
+      html`<${Chart}
+        title="Push of the first impact"
+        height=${220}
+        x=${{ label: "Time since it began", unit: "s", log: true, domain: [Math.min(...lasts) / 20, Math.max(...lasts)] }}
+        y=${{ label: "Contact force", unit: "N", log: true }}
+        series=${series}
+      />`
+    }
+    <${ComparisonTable} caption="First impacts" head="Quantity" runs=${runs} rows=${rows} />
+  </div>`;
+}
+
+// Of the summary, what is not the same for all.
+function metricRows(runs) {
+  const { summary, units } = runs[0].result;
+  return Object.keys(summary)
+    .filter((name) => !/residual|estimate/.test(name))
+    .map((name) => ({
+      name,
+      unit: units[name],
+      values: runs.map(({ result }) => result.summary[name] ?? null),
+    }));
+}
+
+export function Comparison({ comparison: { runs, pairs, inputs }, query, change }) {
+  const warnings = [...new Set(pairs.flatMap((pair) => pair.warnings.map(({ detail }) => detail)))];
+  const hasImpacts = runs.some(({ impact }) => impact);
+  return html`<div class="comparison">
+    <${Lesson} runs=${runs} pairs=${pairs} />
+    <div class="split compare">
+      <${Panel} title="Motion">
+        <${Motions} runs=${runs} pairs=${pairs} query=${query} change=${change} />
+      <//>
+      <div>
+        <${Panel} title="Metrics" help="Summary">
+          <${ComparisonTable}
+            caption="Numbers that differ"
+            head="Metric"
+            runs=${runs}
+            rows=${metricRows(runs)}
+            isDiffering
+          />
+        <//>
+        <${Panel} title="Inputs">
+          <${ComparisonTable}
+            caption="Inputs that differ"
+            head="Input"
+            runs=${runs}
+            rows=${inputs}
+          />
+          ${warnings.map((text) => html`<p class="hint">${text}</p>`)}
+        <//>
+      </div>
+    </div>
+    <${Panel} title="Spectra" help="Spectrum"><${Spectra} runs=${runs} pairs=${pairs} /><//>
+    ${hasImpacts && html`<${Panel} title="First impacts" help="Impacts"><${FirstImpacts} runs=${runs} /><//>`}
+  </div>`;
+}
