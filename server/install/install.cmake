@@ -89,10 +89,6 @@ Files: *
 Copyright: 2026 the impactd authors
 License: Expat
 
-Files: web/vendor/uplot/*
-Copyright: 2022 Leon Sorokin
-License: Expat
-
 Files: web/vendor/htm/*
 Copyright: 2018 Google Inc., 2015-present Jason Miller (Preact, which is part of it)
 License: Apache-2.0 and Expat

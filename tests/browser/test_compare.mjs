@@ -99,15 +99,6 @@ test("What has no force of an impact is compared too: the impulse model, and a s
   await says(page.getByRole("figure", { name: "Over time", exact: true }), /A [^;]* between −12\.89 mm and 15 mm/);
 });
 
-test("Contact models of a scene: what the impulse model makes of its spectrum", async ({ page, daemon, url }) => {
-  const { result } = await daemon.run("compare_sponge");
-  await page.goto(url(`#/results/${result}`));
-  await says(page.getByRole("main"), /The impulse model's spectrum is off by 16 dB: its contacts take no time, these 26 ms on average/);
-  await says(page.getByRole("figure", { name: "Displacement over time" }), /Apart from spring damper, zero penetration by 1 %[^:]*: impulse from 46 ms on, /);
-  // A model is a row.
-  await says(page.getByRole("row", { name: /^impulse/ }), /2\.692 mm\s+\+4\.2 %[^]*16\.17 dB\s+46 ms/);
-});
-
 test("A result that is not there is named, and the page goes on", async ({ page, daemon, url, refused }) => {
   refused(404);
   const [a, b] = await pair(daemon);
