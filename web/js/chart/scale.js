@@ -66,13 +66,29 @@ export const ticksOf = (scale, most) =>
 export function extentOf(arrays, isLog = false) {
   let low = Infinity;
   let high = -Infinity;
-  for (const values of arrays)
-    for (const value of values) {
-      if (!Number.isFinite(value) || (isLog && value <= 0)) continue;
-      if (value < low) low = value;
-      if (value > high) high = value;
-    }
+  for (const values of arrays) {
+    const [least, largest] = endsOf(values, isLog);
+    if (least < low) low = least;
+    if (largest > high) high = largest;
+  }
   return low <= high ? [low, high] : null;
+}
+
+// Of one array; remembered, as arrays are not changed.
+const ends = [new WeakMap(), new WeakMap()];
+function endsOf(values, isLog) {
+  const known = ends[Number(isLog)].get(values);
+  if (known) return known;
+  let low = Infinity;
+  let high = -Infinity;
+  for (let at = 0; at < values.length; at++) {
+    const value = values[at];
+    if (!Number.isFinite(value) || (isLog && value <= 0)) continue;
+    if (value < low) low = value;
+    if (value > high) high = value;
+  }
+  ends[Number(isLog)].set(values, [low, high]);
+  return [low, high];
 }
 
 // The domain of an axis that shows these values with room around them.

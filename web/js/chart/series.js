@@ -13,13 +13,24 @@ import {
 // A colour is the name of a variable of style.css.
 const ink = (series) => ({ "--ink": `var(--${series.color ?? "accent"})` });
 
+// Paths of lines as they were last drawn: while a scene is edited some charts are drawn again unchanged.
+const paths = new WeakMap();
+function linePathOf(series, x, y, density) {
+  const key = JSON.stringify([x.domain, x.pixels, x.isLog, y.domain, y.pixels, y.isLog, density]);
+  const last = paths.get(series.y);
+  if (last?.key === key && last.x === series.x) return last.d;
+  const d = linePath(series.x, series.y, x, y, density);
+  paths.set(series.y, { key, x: series.x, d });
+  return d;
+}
+
 const drawings = {
   line: (series, x, y, density) =>
     html`<path
       class="line"
       style=${{ ...ink(series), strokeWidth: series.lineWidth ?? null }}
       stroke-dasharray=${series.dash ? "5 4" : null}
-      d=${linePath(series.x, series.y, x, y, density)}
+      d=${linePathOf(series, x, y, density)}
     />`,
   band: (series, x, y) =>
     html`<path
@@ -56,6 +67,7 @@ export function valuesInView(series, domain) {
   if (!isSorted(series.x)) return columns;
   const from = Math.max(0, indexAtLeast(series.x, domain[0]) - 1);
   const to = Math.min(series.x.length, indexAtLeast(series.x, domain[1]) + 1);
+  if (from === 0 && to === series.x.length) return columns;
   return columns.map((values) => values.slice(from, to));
 }
 

@@ -2,12 +2,15 @@
 import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { IconButton } from "../ui/controls.js";
+import { useNews } from "../form/draft.js";
 import { number, quantity } from "../units.js";
+import { limit } from "./model.js";
 import { bareScene, makePreview, previewScene, samplesOf } from "./preview.js";
 
 const SPAN = 5; // a slider goes from a fifth of the value to five times it
 const STEPS = 400;
 const MOST_BUCKET = 0.03; // cycles of the first mode
+const POINTS = [1200, 3000]; // of a preview: as few as show the free mass between its stops
 const MOST_COST = 0.05; // s of processor time that a preview may take
 const TOO_LONG = "This run is too long for a preview; Run shows it.";
 
@@ -103,107 +106,122 @@ function effectText({ summary }) {
   return parts.join(", ");
 }
 
-export function Live({ draft, history, signal }) {
-  const [, redraw] = useReducer((count) => count + 1, 0);
-  const [answer, setAnswer] = useState({ data: null, error: null, channels: [], damper: null });
+const NOTHING = { data: null, error: null, channels: [], damper: null };
+
+// What the service answers to the scene as it is now: {answer, bare}.
+function usePreviews(draft, signal) {
+  const [answer, setAnswer] = useState(NOTHING);
   const [bare, setBare] = useState(null);
-  const [range, setRange] = useState(null);
-  const ask = useRef(() => {});
   useEffect(() => {
-    let asked = {};
-    let bareAsked = {};
     let lastBare = "";
-    const show = ({ data, error }) => setAnswer({ ...asked, data, error });
-    const preview = makePreview(show, signal);
-    const barePreview = makePreview(({ data }) => setBare(data && { ...bareAsked, data }), signal);
-    ask.current = () => {
-      asked = previewScene(draft.scene);
-      preview.ask(asked.scene);
+    let frequency = Infinity; // of the first mode, once it is known
+    const follow = ({ asked, ...found }) => {
+      frequency = found.data?.plan.modes[0]?.frequency ?? frequency;
+      setAnswer({ ...asked, ...found });
+    };
+    const preview = makePreview(follow, signal);
+    const show = ({ asked, data }) => setBare(data && { ...asked, data });
+    const barePreview = makePreview(show, signal);
+    const ask = () => {
+      const cycles = draft.scene.duration * frequency;
+      const points = Math.round(limit((1.1 * cycles) / MOST_BUCKET, ...POINTS)) || POINTS[1];
+      preview.ask({ ...previewScene(draft.scene), points });
       const next = bareScene(draft.scene);
       const text = JSON.stringify(next.scene);
       if (text === lastBare) return;
       lastBare = text;
-      bareAsked = next;
-      barePreview.ask(next.scene);
+      barePreview.ask({ ...next, points });
     };
     // What is typed is run once the service has found no fault in it; what a slider or a handle sets, at once.
-    const follow = ({ check, isMoving }) => {
-      redraw();
-      if (isMoving) ask.current();
+    return draft.onChange(({ check, isMoving }) => {
+      if (isMoving) ask();
       if (!check) return;
-      if (check.cost.cpu_seconds <= MOST_COST) ask.current();
-      else setAnswer({ channels: [], damper: null, data: null, error: new Error(TOO_LONG) });
-    };
-    const ends = [draft.onChange(follow), history.onChange(redraw)];
-    return () => ends.forEach((end) => end());
+      if (check.cost.cpu_seconds <= MOST_COST) ask();
+      else setAnswer({ ...NOTHING, error: new Error(TOO_LONG) });
+    });
   }, [draft]);
+  return { answer, bare };
+}
 
-  const { data, error, channels, damper } = answer;
-  const isComplete = data && channels.every((channel) => data.series.channels[channel]);
-  const motion = useMemo(() => isComplete && samplesOf(data, channels[0]), [data]);
-  const ghost = useMemo(() => bare && samplesOf(bare.data, bare.channel), [bare]);
-  const relative = useMemo(() => isComplete && damper && relativeOf(data, channels), [data]);
-  const end = data ? (data.series.samples - 1) / data.series.sample_rate : 0;
-  const time = { label: "Time", unit: "s", domain: [0, end] };
-  const walls = damper
-    ? [-1, 1].map((side) => ({
-        y: (damper.offset ?? 0) + (side * damper.clearance) / 2,
-        label: side < 0 ? "left stop" : "right stop",
-        color: "wall",
-      }))
-    : [];
+function Sliders({ draft }) {
+  useNews(draft);
+  return html`<div class="live-sliders">
+    ${slidersOf(draft.scene).map((slider) => html`<${Slider} key=${slider.pointer} slider=${slider} draft=${draft} />`)}
+  </div>`;
+}
+
+function Steps({ history }) {
+  const [, redraw] = useReducer((count) => count + 1, 0);
+  useEffect(() => history.onChange(redraw), [history]);
+  return html`<div class="actions">
+    <${IconButton} label="Undo (Ctrl+Z)" disabled=${!history.canUndo} onClick=${history.undo}
+      >Undo<//
+    >
+    <${IconButton} label="Redo (Ctrl+Shift+Z)" disabled=${!history.canRedo} onClick=${history.redo}
+      >Redo<//
+    >
+  </div>`;
+}
+
+export function Live({ draft, history, signal }) {
+  const { answer, bare } = usePreviews(draft, signal);
+  const { data, error, damper } = answer;
   return html`<section class="panel live" aria-label="Live">
     <div class="panel-head">
       <h2>Live</h2>
       <p class="live-effect" role="status">
         ${data && damper ? `With the damper: ${effectText(data)}.` : ""}
       </p>
-      <div class="actions">
-        <${IconButton} label="Undo (Ctrl+Z)" disabled=${!history.canUndo} onClick=${history.undo}
-          >Undo<//
-        >
-        <${IconButton}
-          label="Redo (Ctrl+Shift+Z)"
-          disabled=${!history.canRedo}
-          onClick=${history.redo}
-          >Redo<//
-        >
-      </div>
+      <${Steps} history=${history} />
     </div>
-    <div class="live-sliders">
-      ${slidersOf(draft.scene).map((slider) => html`<${Slider} key=${slider.pointer} slider=${slider} draft=${draft} />`)}
-    </div>
+    <${Sliders} draft=${draft} />
     ${error && html`<p class="hint">${error.status === 422 ? TOO_LONG : error.message}</p>`}
-    ${
-      isComplete &&
-      html`<${Chart}
-        title="Displacement"
-        height=${130}
-        x=${time}
-        y=${{ label: "Displacement", unit: "m" }}
-        range=${range}
-        onRange=${setRange}
-        group="live"
-        isCompact=${Boolean(relative)}
-        series=${[
-          ...(ghost && damper ? [{ label: "without damper", color: "ghost", ...ghost }] : []),
-          { label: damper ? "with the damper" : "displacement", color: "displacement", ...motion },
-        ]}
-      />`
-    }
+    <${LiveCharts} answer=${answer} bare=${bare} />
+  </section>`;
+}
+
+const wallsOf = ({ offset = 0, clearance }) =>
+  [-1, 1].map((side) => ({
+    y: offset + (side * clearance) / 2,
+    label: side < 0 ? "left stop" : "right stop",
+    color: "wall",
+  }));
+
+function LiveCharts({ answer, bare }) {
+  const [range, setRange] = useState(null);
+  const { data, channels, damper } = answer;
+  const isComplete = data && channels.every((channel) => data.series.channels[channel]);
+  const motion = useMemo(() => isComplete && samplesOf(data, channels[0]), [data]);
+  const ghost = useMemo(() => bare && samplesOf(bare.data, bare.channel), [bare]);
+  const relative = useMemo(() => isComplete && damper && relativeOf(data, channels), [data]);
+  if (!isComplete) return null;
+  const end = (data.series.samples - 1) / data.series.sample_rate;
+  const shared = {
+    x: { label: "Time", unit: "s", domain: [0, end] },
+    range,
+    onRange: setRange,
+    group: "live",
+  };
+  return html`<${Chart}
+      ...${shared}
+      title="Displacement"
+      height=${130}
+      y=${{ label: "Displacement", unit: "m" }}
+      isCompact=${Boolean(relative)}
+      series=${[
+        ...(ghost && damper ? [{ label: "without damper", color: "ghost", ...ghost }] : []),
+        { label: damper ? "with the damper" : "displacement", color: "displacement", ...motion },
+      ]}
+    />
     ${
       relative &&
       html`<${Chart}
+        ...${shared}
         title="Free mass between its stops"
         height=${110}
-        x=${time}
         y=${{ label: "Free mass between its stops", unit: "m" }}
-        range=${range}
-        onRange=${setRange}
-        group="live"
-        rules=${walls}
+        rules=${wallsOf(damper)}
         series=${[{ label: "free mass", color: "damper", ...relative }]}
       />`
-    }
-  </section>`;
+    }`;
 }

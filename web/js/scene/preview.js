@@ -1,31 +1,28 @@
 // What a scene does while it is edited: runs that the service keeps nothing of, one at a time, always the newest scene.
 import { post } from "../api.js";
 
-const MOST_POINTS = 3000;
-
-// Keeps asking while scenes come: preview.ask(scene); `show({data, error})` after each answer. Stops with the signal.
+// Keeps asking while scenes come: preview.ask({scene, points, …}); `show({asked, data, error})` after each answer, `asked` being what was
+// asked. Stops with the signal.
 export function makePreview(show, signal) {
   let wanted = null;
   let isBusy = false;
   async function run() {
     if (isBusy || wanted === null || signal.aborted) return;
-    const scene = wanted;
+    const asked = wanted;
     wanted = null;
     isBusy = true;
     try {
-      show({
-        data: await post(`v1/preview?points=${MOST_POINTS}`, scene, { signal }),
-        error: null,
-      });
+      const path = `v1/preview?points=${asked.points}`;
+      show({ asked, data: await post(path, asked.scene, { signal }), error: null });
     } catch (error) {
-      if (error.name !== "AbortError") show({ data: null, error });
+      if (error.name !== "AbortError") show({ asked, data: null, error });
     }
     isBusy = false;
     run();
   }
   return {
-    ask(scene) {
-      wanted = scene;
+    ask(next) {
+      wanted = next;
       run();
     },
   };
