@@ -109,3 +109,21 @@ test("Units are chosen in the header: charts, numbers and tables follow at once,
   await choose("Lengths", "Automatic");
   await says(main, /= 15 mm/);
 });
+
+test("A hint on the first visit leads to the tutorial, and does not come again once it was closed or left", async ({ page, url, newPage }) => {
+  const hint = (where) => where.getByRole("region", { name: "First visit" });
+  await page.goto(url("#/scene"));
+  await says(hint(page), /New here\?/);
+  await hint(page).getByRole("link", { name: "Tutorial" }).waitFor();
+  await hint(page).getByRole("button", { name: "Close the hint" }).click();
+  await hint(page).waitFor({ state: "detached" });
+  await page.reload();
+  await page.getByRole("heading", { level: 1, name: "Scene" }).waitFor();
+  assert.equal(await hint(page).count(), 0);
+  const other = await newPage();
+  await other.goto(url("#/jobs"));
+  await other.getByRole("heading", { level: 1, name: "Runs" }).waitFor();
+  await other.goto(url("#/scene"));
+  await other.getByRole("heading", { level: 1, name: "Scene" }).waitFor();
+  assert.equal(await hint(other).count(), 0);
+});

@@ -8,6 +8,7 @@ import { Failure } from "./ui/controls.js";
 import { html, render } from "./ui/preact.js";
 import { askToken } from "./ui/token_dialog.js";
 import { UnitsMenu } from "./ui/units_menu.js";
+import { welcome } from "./ui/welcome.js";
 
 // A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, redraw()?,
 // leave()?}: for a new query on the same path (false: show it anew), for other units (without it: show it anew), and for the end,
@@ -27,9 +28,13 @@ const pages = {
   shell: () => import("./shell.js"),
 };
 
-const [main, tokenButton, skip, version] = ["main", "token", "skip", "version"].map((id) =>
-  document.getElementById(id),
-);
+const [main, tokenButton, skip, version, welcomeBox] = [
+  "main",
+  "token",
+  "skip",
+  "version",
+  "welcome",
+].map((id) => document.getElementById(id));
 let current = null; // {path, stop, controller: promise}
 
 // "materials/felt" is the page "material", "materials/felt/measure" the page "measure".
@@ -83,6 +88,7 @@ async function open(address, signal, isNext) {
   const section = first === "results" ? "jobs" : first;
   for (const anchor of document.querySelectorAll("#pages a"))
     anchor.ariaCurrent = anchor.hash === `#/${section}` ? "page" : null;
+  welcome(welcomeBox, first === "scene");
   try {
     const name = nameOf(address.path);
     if (!Object.hasOwn(pages, name))

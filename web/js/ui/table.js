@@ -20,9 +20,10 @@ export function columnFormat(values, unit, digits = 4) {
   let places = Math.min(decimals, 9);
   const isRound = (value) => !isNumber(value) || (value / factor).toFixed(places).endsWith("0");
   while (places > 0 && values.every(isRound)) places--;
-  // Values over many decades have digits of their own: none is shown as 0 that is not.
-  const least = Math.min(...sizes.filter((one) => one > 0)) / factor;
-  const isWide = least < 5 * 10 ** -places && !isWhole;
+  // Values over many decades have digits of their own: none is shown as 0, or far off, for want of decimals.
+  const isLost = (size) =>
+    Math.abs((size / factor).toFixed(places) - size / factor) > 0.05 * (size / factor);
+  const isWide = sizes.some(isLost);
   const write = (value) => {
     if (!isNumber(value)) return number(value, digits);
     return isPlain && !isWide
