@@ -84,12 +84,17 @@ def test_the_linter_finds_planted_faults():
     assert rules >= {"operation-operationId-unique", "path-parameters-defined", "no-unresolved-refs"}, rules
 
 
+def modules():
+    """Every module of the dashboard."""
+    found = sorted(os.path.join(folder, name) for folder, _, names in os.walk(os.path.join(program.SOURCE, "web", "js"))
+                   for name in names)
+    assert len(found) > 50, found
+    return found
+
+
 def test_the_dashboard_is_formatted():
-    """Every module in a folder of web/js is as prettier formats it, in 100 columns (web/.prettierrc.json)."""
-    folder = os.path.join(program.SOURCE, "web", "js")
-    parts = sorted(name for name in os.listdir(folder) if os.path.isdir(os.path.join(folder, name)))
-    assert len(parts) > 2, parts
-    done = subprocess.run([installed(FORMATTER, "prettier"), "--check", *parts], cwd=folder, capture_output=True, text=True,
+    """Every module of web/js is as prettier formats it, in 100 columns (web/.prettierrc.json)."""
+    done = subprocess.run([installed(FORMATTER, "prettier"), "--check", *modules()], capture_output=True, text=True,
                           timeout=200, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -98,11 +103,7 @@ def test_the_dashboards_code_keeps_its_rules():
     """No ternary stands directly within another, no assignment within an expression; both are found where they are planted."""
     rules = [shutil.which("node"), os.path.join(program.SOURCE, "tests", "contract", "code_rules.mjs"),
              os.path.join(os.path.dirname(os.path.dirname(installed(FORMATTER, "prettier"))), "prettier")]
-    folder = os.path.join(program.SOURCE, "web", "js")
-    modules = sorted(os.path.join(folder, part, name) for part in os.listdir(folder) if os.path.isdir(os.path.join(folder, part))
-                     for name in os.listdir(os.path.join(folder, part)))
-    assert len(modules) > 30, modules
-    done = subprocess.run([*rules, *modules], capture_output=True, text=True, timeout=200, check=True)
+    done = subprocess.run([*rules, *modules()], capture_output=True, text=True, timeout=200, check=True)
     assert done.stdout == "", done.stdout
     planted = os.path.join(program.build, "planted.mjs")
     with open(planted, "w", encoding="utf-8") as file:
