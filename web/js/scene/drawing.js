@@ -149,22 +149,28 @@ function Suspension({ slab, model, layout, x }) {
 function Columns({ slabs, model, layout, xOf }) {
   const { legs } = layout;
   const name = model.kind === "chain" ? "column" : "coupling";
+  const lowest = slabs.at(-1).storey.index;
   return slabs.map(({ storey, y, tall, foot }) => {
-    const [here, below] = [xOf(storey.index), xOf(storey.index - 1)];
+    const here = xOf(storey.index);
+    const isLowest = storey.index === lowest;
+    const below = isLowest && lowest > 0 ? here : xOf(storey.index - 1); // it stands on one that is not drawn
     const d = [-legs, legs].map((leg) => columnPath(here + leg, y + tall, below + leg, foot));
     return html`<path class=${name} d=${d.join("")} />`;
   });
 }
 
+// The names of storeys; where these are close to each other every fifth, without their masses.
 function StoreyLabels({ slab, model, layout }) {
   const { storey, y, tall, foot } = slab;
-  const { isCompact } = layout;
+  const { isCompact, pitch } = layout;
   const half = y + tall / 2;
-  if (isCompact)
-    return html`<${Text} x=${4} y=${half + 4} name="quiet left">${storey.index + 1}<//>`;
-  return html`<${Text} x=${2} y=${half - 2} name="left"
-      >${model.count > 1 ? `storey ${storey.index + 1}` : "structure"}<//
-    >
+  const number = storey.index + 1;
+  const isClose = pitch < 13;
+  if (isClose && number % 5 !== 0 && number !== model.count) return null;
+  const name = model.count > 1 ? `storey ${number}` : "structure";
+  if (isCompact || pitch < 44)
+    return html`<${Text} x=${2} y=${half + 4} name="quiet left">${isCompact ? number : name}<//>`;
+  return html`<${Text} x=${2} y=${half - 2} name="left">${name}<//>
     <${Text} x=${2} y=${half + 13} name="quiet left">${quantity(storey.mass, "kg")}<//>
     ${model.kind === "chain" && html`<${Text} x=${2} y=${(y + tall + foot) / 2 + 4} name="quiet left">${quantity(storey.stiffness, "N/m")}<//>`}`;
 }
@@ -223,10 +229,19 @@ function Foot({ model, layout }) {
   </g>`;
 }
 
+// What storeys stand on; dashed where there are more below.
+function Ground({ model, layout }) {
+  const { left, width, ground, wall } = layout;
+  const x = left - 8;
+  if (model.storeys.at(-1).index > 0)
+    return html`<path class="cut" d=${`M${x} ${px(ground)}H${width}`} />`;
+  return html`<${Hatched} x=${x} y=${ground} width=${width - x} height=${wall - 4} face="top" />`;
+}
+
 // The picture itself. `state` is {displacements of storeys, positions of free masses in theirs, forces on the structure} by
 // index; without it what is at rest, the start dashed. `peak` is the largest force, `trail` the past of the motion.
 export function Picture({ model, layout, state = {}, peak = 0, trail, svgRef }) {
-  const { width, height, middle, scale, slabs, ground, wall } = layout;
+  const { width, height, middle, scale, slabs } = layout;
   const { isSingle } = model;
   const xOf = (index) => middle + (state.displacements?.[index] ?? 0) * scale;
   return html`<svg
@@ -242,13 +257,7 @@ export function Picture({ model, layout, state = {}, peak = 0, trail, svgRef }) 
     ${
       isSingle
         ? html`<${Suspension} slab=${slabs[0]} model=${model} layout=${layout} x=${xOf(0)} />`
-        : html`<${Hatched}
-            x=${layout.left - 8}
-            y=${ground}
-            width=${width - layout.left + 8}
-            height=${wall - 4}
-            face="top"
-          />`
+        : html`<${Ground} model=${model} layout=${layout} />`
     }
     ${!isSingle && html`<${Columns} slabs=${slabs} model=${model} layout=${layout} xOf=${xOf} />`}
     ${slabs.map((slab) => html`<${Slab} key=${slab.storey.index} slab=${slab} layout=${layout} x=${xOf(slab.storey.index)} state=${state} peak=${peak} />`)}

@@ -4,7 +4,7 @@ import { useNews } from "../form/draft.js";
 import { Picture, useRoom } from "./drawing.js";
 import { Handles } from "./handles.js";
 import { layoutOf } from "./layout.js";
-import { modelOf, MOST } from "./model.js";
+import { modelOf, MOST_DAMPERS, MOST_STOREYS } from "./model.js";
 
 // While something is dragged the scale stays what it was.
 export function SceneDrawing({ draft, history }) {
@@ -15,7 +15,9 @@ export function SceneDrawing({ draft, history }) {
   const model = modelOf(draft.scene, draft.check?.plan);
   const layout = width > 0 && layoutOf(model, { width, fixed });
   const onDrag = (isDragging) => setFixed(isDragging ? layout.scale : null);
-  const cut = model.isCut ? ` At most ${MOST} storeys and dampers are drawn.` : "";
+  const cut = model.isCut
+    ? ` At most ${MOST_STOREYS} storeys and ${MOST_DAMPERS} dampers are drawn.`
+    : "";
   return html`<div class="drawing" ref=${box}>
     ${
       layout &&

@@ -26,6 +26,10 @@ function scaleFor(model, { room, least, stroke, fixed }) {
   return most > 0 && most < 1e12 ? roundDown(most, STEPS) : 0;
 }
 
+// Of many storeys each is a thin plate.
+const TALL = 6;
+const PLATES = { full: { bare: 9, gap: 7 }, compact: { bare: 4, gap: 3 } };
+
 const leastWidth = ({ label, radius, stops }, row) =>
   Math.max(
     row === ROWS.full ? label.length * 6.6 + 16 : 0,
@@ -35,7 +39,12 @@ const leastWidth = ({ label, radius, stops }, row) =>
 // {scale, width, height, slabs: [{storey, y, tall, foot, rows}], middle, wide, …}. `stroke` is the largest displacement that
 // will be shown, without it the start's; `height` is what a frame should come to; `fixed` keeps a scale.
 export function layoutOf(model, { width, stroke, height, isCompact, trail = 0, fixed }) {
-  const row = isCompact ? ROWS.compact : ROWS.full;
+  const kind = isCompact ? "compact" : "full";
+  const row = ROWS[kind];
+  const isTall = model.storeys.length > TALL;
+  const { bare, gap: leastGap } = isTall
+    ? PLATES[kind]
+    : { bare: row.bare, gap: isCompact ? 16 : 34 };
   const { isSingle, storeys, dampers } = model;
   const labels = isCompact ? 22 : 88;
   const left = isSingle ? WALL + 2 : labels;
@@ -55,13 +64,13 @@ export function layoutOf(model, { width, stroke, height, isCompact, trail = 0, f
   const bottom = isCompact ? WALL + 6 : WALL + 40;
   const tallOf = (storey) => {
     const own = dampers.filter((one) => one.storey === storey.index).length;
-    const bare = isSingle ? row.cavity + 16 : row.bare;
-    return own * (row.above + row.cavity + row.below) || bare;
+    const empty = isSingle ? row.cavity + 16 : bare;
+    return own * (row.above + row.cavity + row.below) || empty;
   };
   const slabsTall = storeys.reduce((sum, storey) => sum + tallOf(storey), 0);
   const gap = isSingle
     ? 9
-    : limit(((height ?? 420) - top - bottom - slabsTall) / storeys.length, isCompact ? 16 : 34, 66);
+    : limit(((height ?? 430) - top - bottom - slabsTall) / storeys.length, leastGap, 66);
   let y = top;
   const slabs = storeys.map((storey) => {
     const tall = tallOf(storey);
@@ -85,6 +94,7 @@ export function layoutOf(model, { width, stroke, height, isCompact, trail = 0, f
     height: y + bottom,
     scale,
     isCompact,
+    pitch: gap + bare,
     left,
     middle,
     wide,
