@@ -35,7 +35,7 @@ for (const [name, words] of [["paper_free_sponge", /1.35 kg.*0.1107 kg · sponge
 test("A clearance is seen as it is typed; what cannot be read is left out", async ({ page, url, refused }) => {
   refused(422); // the scene without it, where that was asked about
   await page.goto(url("#/scene"));
-  const field = page.getByLabel(/^Clearance/).first();
+  const field = page.getByRole("textbox", { name: "Clearance" }).first();
   await field.fill("0.018");
   await until("18 mm", async () => /clearance 18 mm/.test(await drawing(page).getAttribute("aria-label")));
   const { scale, clearances } = await measured(page);

@@ -66,6 +66,15 @@ function useMotion({ result, path, signal }, model, onPiece, onFailure) {
   }, [result.id]);
 }
 
+// What is played: the window of the address, else what the charts show, where the instant is in it.
+function useWindow({ result, query, shown }) {
+  const range = useStore(shown);
+  const whole = windowOf(result, query);
+  const isAuto = query.from === undefined && query.to === undefined;
+  if (!isAuto || !range || Number(query.t) > range[1]) return whole;
+  return { from: range[0], to: range[1], end: whole.end };
+}
+
 // The instant: {t, isPlaying, seek(t), play(on), note()}. What changes the address elsewhere moves it.
 function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, isReady, onFrame) {
   const [t, setT] = useState(window.from);
@@ -172,7 +181,7 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
       const row = await neighbour(ledger, now.current, side).catch(() => null);
       if (!row || signal.aborted) return;
       const { from, to } = latest.current.window;
-      const isAway = row.start < from || row.start > to;
+      const isAway = row.start < from || row.start > to; // then no part of the time is chosen
       pending.current = null;
       setIsPlaying(false);
       now.current = row.start;
@@ -207,7 +216,7 @@ export function Animation() {
   const model = useMemo(() => modelOf(result.scene, result.plan), [result.id, units]);
   const fail = (problem) => setError(problem);
   const motion = useMotion(context, model, redraw, fail);
-  const window = windowOf(result, query);
+  const window = useWindow(context);
   const cursor = cursorOf("time");
   const follow = (x) => cursor.set(x === null ? null : { x, y: null, owner: null });
   const isReady = (t) => motion.stateAt?.(t);

@@ -2,20 +2,21 @@
 import { note, read } from "../address.js";
 import { get } from "../api.js";
 import { createContext, useContext, useMemo, useState } from "../ui/preact.js";
+import { createStore } from "../ui/store.js";
 import { Ledger } from "./ledger.js";
 
 export const ResultContext = createContext(null);
 export const useResult = () => useContext(ResultContext);
 
 // {result, path, query, change, ledger, jobs (a promise of the latest), signal}: `query` is the address as it is now; change()
-// writes to it, and what shows the context is drawn again.
+// writes to it, and what shows the context is drawn again. `shown` is a store of the part of the time that charts show, null is all.
 export function useResultContext(result, signal) {
   const [, redraw] = useState(0);
   const path = `v1/results/${result.id}`;
   const kept = useMemo(() => {
     const jobs = get("v1/jobs", { result: result.id, limit: 20 }).then((answer) => answer.jobs);
     jobs.catch(() => {}); // who shows them says so
-    return { jobs, ledger: new Ledger({ path, result }) };
+    return { jobs, ledger: new Ledger({ path, result }), shown: createStore(null) };
   }, [result.id]);
   const change = (changes, push = false) => {
     note(changes, push);

@@ -1,6 +1,6 @@
 // The motion over time: charts on one time axis, impacts as ticks, the structure without its damper, the free mass between
 // its stops.
-import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { Chart, MARGIN } from "../chart/chart.js";
 import { Button, Failure, Notice } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
@@ -150,6 +150,7 @@ export function Motion() {
     return until < QUIET_PART * window.end ? Number(until.toPrecision(2)) : null;
   }, [loaded.data]);
   const range = isAuto ? quiet && [0, quiet] : [window.from, window.to];
+  useEffect(() => context.shown.set(range), [range?.[0], range?.[1]]);
   const setRange = (next) =>
     change(
       next
