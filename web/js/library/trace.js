@@ -2,32 +2,27 @@
 import { Chart } from "../chart/chart.js";
 import { faultText } from "../ui/controls.js";
 import { freshId } from "../ui/ids.js";
+import { numberRows } from "../ui/number_rows.js";
 import { html, useRef } from "../ui/preact.js";
 import { number, pretty, quantity, words } from "../units.js";
 
 const MAX_NAMED = 6; // contacts in the sentence
 
-// {interval, force} of lines of a time in s and a force in N; what stands before them is a heading. Beside a semicolon or a
-// tab a comma is a decimal one.
+// {interval, force} of lines of a time in s and a force in N; what stands before them is a heading.
 function readTrace(text) {
-  const split = (line) =>
-    /[;\t]/.test(line) ? line.replaceAll(",", ".").split(/[;\t]/) : line.trim().split(/[,\s]+/);
-  const all = text
-    .trim()
-    .split(/\r?\n/)
-    .map((line) => split(line).map(parseFloat));
-  const isRow = (row) => row.length === 2 && row.every(Number.isFinite);
-  const first = all.findIndex(isRow);
-  if (first < 0) throw new Error("No line has two numbers: a time in s and a force in N.");
-  const rows = all.slice(first);
-  const last = rows.findLastIndex(isRow);
-  const [start] = rows[0];
-  const interval = (rows[last][0] - start) / last;
-  const isEven = (row, at) => Math.abs(row[0] - start - at * interval) <= 0.3 * interval;
-  const bad = rows.findIndex((row, at) => !(isRow(row) && isEven(row, at)));
-  if (bad >= 0)
-    throw new Error(`Line ${first + bad + 1}: a time in s, at even steps, and a force in N.`);
-  return { interval: Number(interval.toPrecision(12)), force: rows.map(([, force]) => force) };
+  const isRow = (numbers) => numbers.length === 2 && numbers.every(Number.isFinite);
+  const { rows } = numberRows(text, isRow);
+  if (rows.length === 0) throw new Error("No line has two numbers: a time in s and a force in N.");
+  const last = rows.findLastIndex(({ numbers }) => isRow(numbers));
+  const [start] = rows[0].numbers;
+  const interval = (rows[last].numbers[0] - start) / last;
+  const isEven = ([time], at) => Math.abs(time - start - at * interval) <= 0.3 * interval;
+  const bad = rows.find(({ numbers }, at) => !(isRow(numbers) && isEven(numbers, at)));
+  if (bad) throw new Error(`Line ${bad.line}: a time in s, at even steps, and a force in N.`);
+  return {
+    interval: Number(interval.toPrecision(12)),
+    force: rows.map(({ numbers }) => numbers[1]),
+  };
 }
 
 // A contact in words; or why there is none, or no pulse that fits.

@@ -15,6 +15,7 @@ import { ImpactPanel } from "./impact.js";
 import { ImpactTable } from "./impacts.js";
 import { KINDS } from "../study/kinds.js";
 import { StudyButtons, StudyStart } from "./studies.js";
+import { MeasuredButton, MeasuredPanel } from "./measured.js";
 import { Method } from "./method.js";
 import { Motion } from "./motion.js";
 import { Spectrum } from "./spectrum.js";
@@ -36,6 +37,7 @@ export function ResultView({ result, signal }) {
   const hasDamper = result.scene.dampers.length > 0;
   return html`<${ResultContext.Provider} value=${context}>
     <${ResultHeadlines} />
+    <${MeasuredPanel} />
     <div class="panel-grid">
       <${Motion} />
       <aside>
@@ -115,6 +117,7 @@ function ResultPage({ address, signal }) {
           >
           <${CompareMenu} key=${loaded.data.id} result=${loaded.data} />
           <a class="button" href=${link(`results/${loaded.data.id}/report`)}>Report</a>
+          ${hasStudies && html`<${MeasuredButton} key=${loaded.data.id} result=${loaded.data} />`}
           ${hasStudies && html`<${StudyButtons} scene=${loaded.data.scene} onChoose=${setChosen} />`}
         </div>`
       }

@@ -14,7 +14,8 @@ function bandMeans({ x, y }) {
   return bands;
 }
 
-// The bands that both spectra have: [{frequency, low, high, level, count}], `level` in dB of the second over the first.
+// The bands that both spectra have: [{frequency, low, high, mean, level, count}], `mean` of the first, `level` in dB of the
+// second over it.
 export function bandDifferences(first, second) {
   const [means, others] = [bandMeans(first), bandMeans(second)];
   return [...means]
@@ -24,6 +25,7 @@ export function bandDifferences(first, second) {
       frequency: 10 ** (band / STEPS),
       low: 10 ** ((band - 0.5) / STEPS),
       high: 10 ** ((band + 0.5) / STEPS),
+      mean,
       level: 10 * Math.log10(others.get(band).mean / mean),
       count: Math.min(count, others.get(band).count),
     }));
