@@ -136,7 +136,7 @@ function Suspension({ slab, model, layout, x }) {
     <${Hatched} x=${0} y=${y - 6} width=${wall} height=${ground - y + 6} face="right" />
     <${Hatched} x=${0} y=${ground} width=${width} height=${wall - 4} face="top" />
     <${Spring} from=${from} to=${to} y=${upper} />
-    ${model.damping && html`<${Dashpot} from=${from} to=${to} rest=${rest} y=${lower} />`}
+    ${model.damping && html`<${Dashpot} from=${from} to=${to} rest=${rest} far=${layout.far} y=${lower} />`}
     ${
       !isCompact &&
       html`<${Text} x=${label} y=${upper - 13} name="quiet">${quantity(storey.stiffness, "N/m")}<//>

@@ -60,7 +60,7 @@ export function layoutOf(model, { width, stroke, height, isCompact, trail = 0, f
   const spring = SPRING + Math.max(far, (room - wide - far) * 0.45);
   const middle = isSingle ? left + spring + wide / 2 : left + room / 2;
 
-  const top = isCompact ? 8 + trail : 46;
+  const top = isCompact ? 8 + trail : Math.max(46, trail + 26);
   const bottom = isCompact ? WALL + 6 : WALL + 40;
   const tallOf = (storey) => {
     const own = dampers.filter((one) => one.storey === storey.index).length;
@@ -96,6 +96,7 @@ export function layoutOf(model, { width, stroke, height, isCompact, trail = 0, f
     isCompact,
     pitch: gap + bare,
     left,
+    far,
     middle,
     wide,
     legs: LEGS * wide,

@@ -44,14 +44,18 @@ export function Spring({ from, to, y }) {
   />`;
 }
 
-// A piston on a rod from the right in a cylinder on a rod from the left; `rest` is its length unloaded.
-export function Dashpot({ from, to, rest, y }) {
+// A piston on a rod from the right in a cylinder on a rod from the left; `rest` is its length unloaded, `far` the largest way
+// from there. Where that is longer than the cylinder, the piston moves in proportion.
+export function Dashpot({ from, to, rest, far, y }) {
   const [lead, half] = [14, 7];
-  const end = from + rest * 0.72;
-  const piston = limit(to - rest * 0.55, from + lead + 4, end - 3);
+  const start = from + lead;
+  const end = from + lead + Math.max(16, Math.min(rest * 0.6, rest - far - lead - 3));
+  const travel = (end - start) / 2 - 4;
+  const way = to - from - rest;
+  const piston = (start + end) / 2 + limit(way * Math.min(1, travel / (far || 1)), -travel, travel);
   return html`<g class="dashpot">
     <path
-      d=${`M${px(from)} ${y}h${lead}M${px(end)} ${y - half}H${px(from + lead)}v${2 * half}H${px(end)}`}
+      d=${`M${px(from)} ${y}h${lead}M${px(end)} ${y - half}H${px(start)}v${2 * half}H${px(end)}`}
     />
     <path class="piston" d=${`M${px(piston)} ${y - half + 2}v${2 * half - 4}`} />
     <path d=${`M${px(piston)} ${y}H${px(to)}`} />

@@ -27,6 +27,7 @@ const PAINT = [
   "paint-order",
   "font-size",
   "font-weight",
+  "text-anchor",
 ];
 
 // Colours of style.css are mixed for the screen; "color(srgb r g b / a)" is not known outside of browsers.
