@@ -106,6 +106,14 @@ def test_every_type_of_problem_has_its_section():
         assert daemon.get(kind).status == 303, kind
 
 
+def test_the_guides_module_finds_what_it_imports():
+    """Every module that guide.js imports is there."""
+    names = re.findall(r'^import .* from "(.*)";$', read("web", "guide", "guide.js"), re.M)
+    assert len(names) > 2, names
+    for name in names:
+        assert os.path.exists(os.path.join(program.SOURCE, "web", "guide", name)), name
+
+
 def test_every_question_mark_of_the_dashboard_leads_to_a_section():
     """The places of js/help.js and the pages of studies exist, and the header of the dashboard has the guide."""
     places = re.findall(r'"?: "([\w-]+)(?:#([\w-]+))?"', read("web", "js", "help.js"))

@@ -3,7 +3,7 @@ import { ask } from "../api.js";
 import { readNpy } from "../npy.js";
 import { limit } from "./model.js";
 
-const PIECE = 24000; // numbers, few so that the first piece comes soon
+const PIECE = 6000; // numbers, few so that the first piece comes soon
 const MOST_PIECES = 8; // kept
 
 // `channels` are names; at(t) is null while the piece is on its way, then (name) -> value at t; `onPiece()` is called when one
