@@ -113,16 +113,21 @@ function usePreviews(draft, signal) {
   const [answer, setAnswer] = useState(NOTHING);
   const [bare, setBare] = useState(null);
   useEffect(() => {
+    let last = ""; // what was asked, unless it was refused
     let lastBare = "";
     let frequency = Infinity; // of the first mode, once it is known
     const follow = ({ asked, ...found }) => {
       frequency = found.data?.plan.modes[0]?.frequency ?? frequency;
+      if (found.error) last = "";
       setAnswer({ ...asked, ...found });
     };
     const preview = makePreview(follow, signal);
     const show = ({ asked, data }) => setBare(data && { ...asked, data });
     const barePreview = makePreview(show, signal);
     const ask = () => {
+      const now = JSON.stringify(draft.scene);
+      if (now === last) return;
+      last = now;
       const cycles = draft.scene.duration * frequency;
       const points = Math.round(limit((1.1 * cycles) / MOST_BUCKET, ...POINTS)) || POINTS[1];
       preview.ask({ ...previewScene(draft.scene), points });
@@ -137,7 +142,10 @@ function usePreviews(draft, signal) {
       if (isMoving) ask();
       if (!check) return;
       if (check.cost.cpu_seconds <= MOST_COST) ask();
-      else setAnswer({ ...NOTHING, error: new Error(TOO_LONG) });
+      else {
+        last = "";
+        setAnswer({ ...NOTHING, error: new Error(TOO_LONG) });
+      }
     });
   }, [draft]);
   return { answer, bare };
