@@ -1,7 +1,7 @@
 // "Compare with …": the same scene with one thing changed is run, and both results are shown beside each other.
 import { go, link } from "../address.js";
 import { follow, get, submit } from "../api.js";
-import { Button, Failure, Menu } from "../ui/controls.js";
+import { Button, Failure, Loaded, Menu } from "../ui/controls.js";
 import { html, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 
@@ -26,7 +26,6 @@ const withContact = (model) => (scene) => ({ ...scene, contact: { ...scene.conta
 
 // {label, change(scene)} for this scene.
 function choicesOf(scene, plan, materials) {
-  if (scene.dampers.length === 0) return [];
   const used = usedBy(scene);
   const isImpulse = plan.contact_model === "impulse";
   return [
@@ -45,16 +44,28 @@ function choicesOf(scene, plan, materials) {
   ];
 }
 
-export function CompareMenu({ result }) {
-  const [state, setState] = useState({});
+// Made when the menu is opened: only then are materials asked for.
+function Choices({ result, run }) {
   const { scene, plan, id } = result;
-  const hasDamper = scene.dampers.length > 0;
   const loaded = useLoaded(
-    async (signal) =>
-      hasDamper ? (await get("v1/materials", { limit: 200 }, signal)).materials : [],
+    async (signal) => (await get("v1/materials", { limit: 200 }, signal)).materials,
     [id],
   );
-  const choices = choicesOf(scene, plan, loaded.data ?? []);
+  return html`${
+      scene.dampers.length > 0 &&
+      html`<${Loaded} loaded=${loaded}>
+        ${(materials) =>
+          choicesOf(scene, plan, materials).map(
+            (choice) =>
+              html`<${Button} isQuiet onClick=${() => void run(choice)}>${choice.label}<//>`,
+          )}
+      <//>`
+    } <a class="menu-link" href=${link("compare", { a: id })}>An earlier run …</a>`;
+}
+
+export function CompareMenu({ result }) {
+  const [state, setState] = useState({});
+  const { scene, id } = result;
   const run = async ({ label, change }) => {
     setState({ running: label });
     try {
@@ -68,10 +79,7 @@ export function CompareMenu({ result }) {
     }
   };
   if (state.running)
-    return html`<span class="quiet" role="status">${`Running with ${state.running} …`}</span>`;
-  return html`<${Menu} label="Compare with …">
-      ${choices.map((choice) => html`<${Button} isQuiet onClick=${() => void run(choice)}>${choice.label}<//>`)}
-      <a class="menu-link" href=${link("compare", { a: id })}>An earlier run …</a>
-    <//>
+    return html`<span class="quiet" role="status">${`Running: ${state.running} …`}</span>`;
+  return html`<${Menu} label="Compare with …"><${Choices} result=${result} run=${run} /><//>
     ${state.error && html`<${Failure} error=${state.error} />`}`;
 }

@@ -1,12 +1,12 @@
-// A measured motion over a result: dropped on the page or chosen, shifted in time, compared over time and in the spectrum. In
+// A measured motion over a result: shifted in time, compared over time and in the spectrum. In
 // the address: measured (the channel), shift (s).
-import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { html, useMemo, useState } from "../ui/preact.js";
 import { ask, post } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { bandDifferences, bandSeries, furthestBand } from "../runs/bands.js";
 import { readNpy } from "../npy.js";
-import { Button, Choice, Failure, IconButton, Loaded, Notice, Panel } from "../ui/controls.js";
-import { createStore, useLoaded, useStore } from "../ui/store.js";
+import { Button, Choice, Failure, Loaded, Notice } from "../ui/controls.js";
+import { useLoaded } from "../ui/store.js";
 import { number, pretty, quantity, title, words } from "../units.js";
 import { useResult, windowOf } from "./context.js";
 import { readMeasured, VALUE_UNITS } from "./measured_file.js";
@@ -17,82 +17,6 @@ import { welch } from "./welch.js";
 const MOST_SAMPLES = 2e6;
 const AUDIBLE = 1e-3; // of the loudest third octave: quieter ones are not put into words
 const SEGMENTS = 4; // of the common span at least
-const stores = new Map(); // by the result: {file, error}
-const KEY = "impactd.measured.";
-
-// What was chosen for a result; the browser keeps it until the tab is closed.
-function storeOf({ id, channels }) {
-  if (!stores.has(id)) {
-    const store = createStore({ file: null, error: null });
-    stores.set(id, store);
-    const kept = JSON.parse(sessionStorage.getItem(KEY + id) ?? "null");
-    if (kept) store.set({ file: readMeasured(kept.text, kept.name, channels), error: null });
-  }
-  return stores.get(id);
-}
-
-async function readFile(result, file) {
-  const store = storeOf(result);
-  try {
-    const text = await file.text();
-    store.set({ file: readMeasured(text, file.name, result.channels), error: null });
-    try {
-      sessionStorage.setItem(KEY + result.id, JSON.stringify({ name: file.name, text }));
-    } catch {
-      // too large to be kept over a reload
-    }
-  } catch (error) {
-    store.patch({ error });
-  }
-}
-
-function forget(result) {
-  sessionStorage.removeItem(KEY + result.id);
-  storeOf(result).set({ file: null, error: null });
-}
-
-// The same file may be chosen again.
-function forgetChoice(event) {
-  event.currentTarget.value = "";
-}
-
-// The button; a file may be dropped anywhere on the page too.
-export function MeasuredButton({ result }) {
-  const input = useRef(null);
-  const [isOver, setIsOver] = useState(false);
-  useEffect(() => {
-    const hasFiles = (event) => event.dataTransfer?.types.includes("Files");
-    const stop = new AbortController();
-    const listen = (name, act) => addEventListener(name, act, { signal: stop.signal });
-    listen("dragover", (event) => {
-      if (!hasFiles(event)) return;
-      event.preventDefault();
-      setIsOver(true);
-    });
-    listen("dragleave", (event) => event.relatedTarget === null && setIsOver(false));
-    listen("drop", (event) => {
-      if (!hasFiles(event)) return;
-      event.preventDefault();
-      setIsOver(false);
-      if (event.dataTransfer.files[0]) readFile(result, event.dataTransfer.files[0]);
-    });
-    return () => stop.abort();
-  }, [result.id]);
-  const choose = (event) => {
-    const [file] = event.currentTarget.files;
-    if (file) readFile(result, file);
-  };
-  return html`<${Button} onClick=${() => input.current.click()}>Measured data …<//>
-    <input
-      ref=${input}
-      type="file"
-      hidden
-      accept=".csv,.txt,.dat,.asc,.tsv,text/*"
-      onClick=${forgetChoice}
-      onChange=${choose}
-    />
-    ${isOver && html`<div class="drop-area"><p>Drop a text file of times and values</p></div>`}`;
-}
 
 // Channels that a measurement in this unit can be compared with; without a unit all that have one.
 function channelsFor(result, unit) {
@@ -179,17 +103,19 @@ function spectraOf(series, measured, shift, { from, to }, rate) {
   return [simulated, later].map((signal) => welch(signal, { from, to, seconds }));
 }
 
-// As MeasuredButton brings it.
-export function MeasuredPanel() {
+// The measurement in a text file, or what is wrong with it.
+export function MeasuredText({ name, text }) {
   const { result } = useResult();
-  const { file, error } = useStore(storeOf(result));
-  if (!file && !error) return null;
-  const close = () => forget(result);
-  const actions = html`<${IconButton} label="Close the measured data" onClick=${close}>Close<//>`;
-  return html`<${Panel} title="Measured data" help="Compare" actions=${actions}>
-    ${error && html`<${Notice} kind="bad" title="The file was not read"><p>${error.message}</p><//>`}
-    ${file && html`<${Measured} key=${file.name + file.values.length} file=${file} />`}
-  <//>`;
+  const { file, error } = useMemo(() => {
+    try {
+      return { file: readMeasured(text, name, result.channels) };
+    } catch (problem) {
+      return { error: problem };
+    }
+  }, [text]);
+  if (error)
+    return html`<${Notice} kind="bad" title="The file was not read"><p>${error.message}</p><//>`;
+  return html`<${Measured} key=${text} file=${file} />`;
 }
 
 function Measured({ file }) {
@@ -265,16 +191,24 @@ function Measured({ file }) {
     <//>`;
 }
 
-const NumberField = ({ label, value, onChange }) =>
-  html`<label class="number-field">
+// What is typed stands until it is entered, whatever is drawn anew meanwhile.
+function NumberField({ label, value, onChange }) {
+  const [typed, setTyped] = useState(null);
+  const enter = (event) => {
+    setTyped(null);
+    onChange(Number(event.currentTarget.value));
+  };
+  return html`<label class="number-field">
     ${label}
     <input
       type="number"
       step="any"
-      value=${value}
-      onChange=${(event) => onChange(Number(event.currentTarget.value))}
+      value=${typed ?? value}
+      onInput=${(event) => setTyped(event.currentTarget.value)}
+      onChange=${enter}
     />
   </label>`;
+}
 
 function Overlay({ series, measured, shift, channel }) {
   const { result, query, change } = useResult();

@@ -13,9 +13,10 @@ import { Files } from "./files.js";
 import { ResultHeadlines } from "./headlines.js";
 import { ImpactPanel } from "./impact.js";
 import { ImpactTable } from "./impacts.js";
+import { sceneName } from "../runs/scene_name.js";
 import { KINDS } from "../study/kinds.js";
 import { StudyButtons, StudyStart } from "./studies.js";
-import { MeasuredButton, MeasuredPanel } from "./measured.js";
+import { MeasuredButton, MeasuredPanel } from "./measured_button.js";
 import { Method } from "./method.js";
 import { Motion } from "./motion.js";
 import { Spectrum } from "./spectrum.js";
@@ -37,7 +38,7 @@ export function ResultView({ result, signal }) {
   const hasDamper = result.scene.dampers.length > 0;
   return html`<${ResultContext.Provider} value=${context}>
     <${ResultHeadlines} />
-    <${MeasuredPanel} />
+    <${MeasuredPanel} id=${result.id} />
     <div class="panel-grid">
       <${Motion} />
       <aside>
@@ -103,7 +104,8 @@ function ResultPage({ address, signal }) {
     [id],
     attempt,
   );
-  const name = jobs.data?.find((job) => job.title)?.title ?? "Result";
+  const own = jobs.data?.find((job) => job.title)?.title;
+  const name = own ?? (loaded.data && jobs.data ? sceneName(loaded.data.scene) : "Result");
   const [chosen, setChosen] = useState(null); // a study, before it starts
   const hasStudies = loaded.data && !loaded.data.study;
   return html`<div class="result">
@@ -117,7 +119,7 @@ function ResultPage({ address, signal }) {
           >
           <${CompareMenu} key=${loaded.data.id} result=${loaded.data} />
           <a class="button" href=${link(`results/${loaded.data.id}/report`)}>Report</a>
-          ${hasStudies && html`<${MeasuredButton} key=${loaded.data.id} result=${loaded.data} />`}
+          ${hasStudies && html`<${MeasuredButton} key=${loaded.data.id} id=${loaded.data.id} />`}
           ${hasStudies && html`<${StudyButtons} scene=${loaded.data.scene} onChoose=${setChosen} />`}
         </div>`
       }

@@ -57,7 +57,8 @@ const Pairs = () =>
 
 // The compared results, each with its colour, and a list to add one from.
 function Chosen({ ids, labels, names }) {
-  const set = (next) => go("compare", lettered(next));
+  // From the address: the page may not be drawn yet as it says.
+  const set = (make) => go("compare", lettered(make(idsOf(read().query))));
   const others = [...names].filter(([id]) => !ids.includes(id));
   return html`<div class="compared">
     ${ids.map((id, at) => {
@@ -67,7 +68,7 @@ function Chosen({ ids, labels, names }) {
         <a href=${link(`results/${id}`)} title=${names.get(id)}>${label}</a>
         <${IconButton}
           label=${`Take ${label} out`}
-          onClick=${() => set(ids.filter((one) => one !== id))}
+          onClick=${() => set((now) => now.filter((one) => one !== id))}
           >×<//
         >
       </span>`;
@@ -77,7 +78,7 @@ function Chosen({ ids, labels, names }) {
       html`<select
         aria-label="Add a result"
         value=""
-        onChange=${(event) => set([...ids, event.currentTarget.value])}
+        onChange=${({ currentTarget: { value } }) => set((now) => [...now, value])}
       >
         <option value="">${ids.length === 0 ? "Choose a result …" : "Add a result …"}</option>
         ${others.map(([id, text]) => html`<option value=${id}>${text}</option>`)}

@@ -2,7 +2,8 @@
 import { get, schema as schemaNamed } from "../api.js";
 import { inputsOf } from "../scene/inputs.js";
 import { differingNames } from "./names.js";
-import { isSame, valueText } from "./scenes.js";
+import { valueText } from "./scene_name.js";
+import { isSame } from "./scenes.js";
 
 export const LETTERS = [..."abcd"];
 export const idsOf = (query) => LETTERS.map((letter) => query[letter]).filter(Boolean);

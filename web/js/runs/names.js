@@ -1,9 +1,9 @@
 // Names that tell runs apart: their own titles, else what differs in their scenes.
 import { words } from "../units.js";
-import { labelOf, valueText, varyingInputs } from "./scenes.js";
+import { capital, materialOf, valueText } from "./scene_name.js";
+import { labelOf, varyingInputs } from "./scenes.js";
 
 const MOST_PARTS = 3; // of a name
-const capital = (text) => text.replace(/^./, (letter) => letter.toUpperCase());
 
 // "clearance 15 mm"; words speak for themselves: "sponge".
 const partText = ({ label, unit }, value) =>
@@ -17,12 +17,6 @@ function studyText({ kind, axes, variables, parameters }) {
 }
 
 // What a scene is where nothing else tells it: "sponge, free".
-function materialOf(scene) {
-  const [damper] = scene.dampers ?? [];
-  const buffer = damper?.buffer ?? damper?.left_buffer;
-  if (!damper) return "no damper";
-  return buffer?.material ? valueText(buffer.material) : "a damper";
-}
 const plainName = (scene) => `${materialOf(scene)}, ${words(scene.excitation?.kind ?? "free")}`;
 
 // A name for each of {scene, title}: by the inputs that vary among them, else by what they are. Without a title the material

@@ -11,7 +11,8 @@ import { Table } from "../ui/table.js";
 import { moment, title } from "../units.js";
 import { Actions } from "./actions.js";
 import { namesOf } from "./names.js";
-import { valueText, varyingInputs } from "./scenes.js";
+import { valueText } from "./scene_name.js";
+import { varyingInputs } from "./scenes.js";
 import { isOpen, StateBadge, STATES } from "./state.js";
 
 const LIMIT = 100;

@@ -1,6 +1,6 @@
 // What differs between scenes: the inputs that vary, with short labels, units and a value for each scene.
 import { unitAt } from "../scene/inputs.js";
-import { quantity, words } from "../units.js";
+import { words } from "../units.js";
 
 const LEFT_OUT = /^\/(output|study|title|labels)\b/;
 const SECTIONS = [
@@ -62,13 +62,6 @@ export function labelOf(pointer, hasManyDampers = false) {
   if (name === "kind") return words(section);
   if (rest.length > 0 && /^\d+$/.test(rest.at(-1))) return words(`${rest.at(-2)} ${name}`);
   return ["mass", "model", "displacement"].includes(name) ? `${words(section)} ${name}` : name;
-}
-
-// "sponge" of "sponge@1", "zero force" of "zero_force", "15 mm".
-export function valueText(value, unit) {
-  if (typeof value === "number") return quantity(value, unit);
-  if (value === undefined || value === null) return "–";
-  return words(String(value).replace(/@\d+$/, "")).slice(0, 60);
 }
 
 // The inputs that are not the same in all scenes that have them: [{pointer, label, unit, values}], the most telling first. Numbers of a
