@@ -21,7 +21,7 @@ test("A material is chosen by keyboard and comes to k_b and c_b with their ± fo
   await tabTo(page, list);
   await page.keyboard.type("Felt");
   const buffers = page.getByRole("group", { name: "Buffers" });
-  await says(buffers, /k_b 2\.895 ± 0\.3 kN\/m, c_b 12\.32 ± 1\.2 N s\/m, ζ 0\.3579 ± 0\.026/);
+  await says(buffers, /k_?b 2\.895 ± 0\.3 kN\/m, c_?b 12\.32 ± 1\.2 N s\/m, ζ 0\.3579 ± 0\.026/);
   await says(buffers, /Measured from 0\.2 .*to 0\.8 m\/s/);
   await says(list.locator("option:checked"), /Felt: e 0\.3, T_c 20 ms, draft/);
   assert.equal((await sceneOf(page)).dampers[0].buffer, "felt");
@@ -33,11 +33,11 @@ test("A material is chosen by keyboard and comes to k_b and c_b with their ± fo
 test("Own numbers begin with the material's, and what they come to follows", async ({ page, url }) => {
   await page.goto(url("#/scene"));
   const buffers = page.getByRole("group", { name: "Buffers" });
-  await says(buffers, /k_b 1\.656 kN\/m/);
+  await says(buffers, /k_?b 1\.656 kN\/m/);
   await buffers.getByRole("combobox", { name: "Material" }).selectOption({ label: "own e and T_c" });
   assert.equal(await buffers.getByLabel("Restitution").inputValue(), "0.61");
   await buffers.getByLabel("Restitution").fill("0.2");
-  await says(buffers, /k_b 2\.04 kN\/m/);
+  await says(buffers, /k_?b 2\.04 kN\/m/);
   await buffers.getByRole("combobox", { name: "Material" }).selectOption({ label: "own stiffness" });
   const { buffer } = (await sceneOf(page)).dampers[0];
   assert.ok(Math.abs(buffer.stiffness - 2039.9) < 1 && buffer.damping > 13, JSON.stringify(buffer));
@@ -49,7 +49,7 @@ test("Both sides get buffers of their own, and one again", async ({ newPage, url
   await page.getByLabel("The same on both sides").uncheck();
   await page.getByRole("group", { name: "Right buffer" }).getByRole("combobox", { name: "Material" })
     .selectOption({ label: "Aluminium: e 0.46, T_c 300 µs, approved" });
-  await says(page.getByRole("group", { name: "Right buffer" }), /k_b 1[\d.]+ MN\/m/);
+  await says(page.getByRole("group", { name: "Right buffer" }), /k_?b 1[\d.]+ MN\/m/);
   const [damper] = (await sceneOf(page)).dampers;
   assert.deepEqual([damper.left_buffer, damper.right_buffer, damper.buffer], ["sponge", "aluminium", undefined]);
   assert.equal(await overflow(page), 0);

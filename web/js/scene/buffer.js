@@ -4,7 +4,7 @@ import { useDraft, useNews } from "../form/draft.js";
 import { ChoiceField } from "../form/fields.js";
 import { Form } from "../form/form.js";
 import { figure, path, range } from "../library/format.js";
-import { Failure } from "../ui/controls.js";
+import { Failure, withSubscripts } from "../ui/controls.js";
 import { html, useMemo, useRef } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { quantity } from "../units.js";
