@@ -1,6 +1,6 @@
 // The scene as it is edited: sliders, the preview that follows, undo and redo.
 import assert from "node:assert/strict";
-import { hold, pace, says, tabTo, test, until } from "./support.mjs";
+import { hold, says, tabTo, test, until } from "./support.mjs";
 
 const live = (page) => page.getByRole("region", { name: "Live", exact: true });
 const slider = (page, name) => live(page).getByRole("slider", { name });
