@@ -53,7 +53,7 @@ function Lesson({ runs, pairs }) {
   const [first, ...others] = runs;
   const texts = [
     ...others.map((other) => motionText(first, other)),
-    ...others.map((other) => pushText([first, other])),
+    runs.length === 2 && pushText(runs),
     partingText(runs, pairs),
   ].filter(Boolean);
   return html`<div class="decision">
@@ -288,13 +288,14 @@ function metricRows(runs) {
 export function Comparison({ comparison: { runs, pairs, inputs }, query, change }) {
   const warnings = [...new Set(pairs.flatMap((pair) => pair.warnings.map(({ detail }) => detail)))];
   const hasImpacts = runs.some(({ impact }) => impact);
+  const isNarrow = runs.length === 2; // tables of two runs stand beside the charts
   return html`<div class="comparison">
     <${Lesson} runs=${runs} pairs=${pairs} />
-    <div class="split compare">
+    <div class=${isNarrow ? "split compare" : "compare"}>
       <${Panel} title="Motion">
         <${Motions} runs=${runs} pairs=${pairs} query=${query} change=${change} />
       <//>
-      <div>
+      <div class=${isNarrow ? null : "columns"}>
         <${Panel} title="Metrics" help="Summary">
           <${ComparisonTable}
             caption="Numbers that differ"

@@ -54,10 +54,10 @@ export function labelOf(pointer, hasManyDampers = false) {
   const [section, ...rest] = pointer.slice(1).split("/");
   const name = words(rest.at(-1) ?? section);
   if (section === "dampers") {
-    const which = hasManyDampers ? ` ${Number(rest[0]) + 1}` : "";
+    const which = hasManyDampers || rest[0] !== "0" ? `damper ${Number(rest[0]) + 1}` : "";
     const side = /^(left|right)_/.exec(rest[1])?.[1];
-    const own = name === "mass" ? "damper mass" : name;
-    return [side, `${own}${which}`].filter(Boolean).join(" ");
+    const own = name === "mass" && !which ? "damper mass" : name;
+    return [which, side, own].filter(Boolean).join(" ");
   }
   if (name === "kind") return words(section);
   if (rest.length > 0 && /^\d+$/.test(rest.at(-1))) return words(`${rest.at(-2)} ${name}`);
@@ -68,7 +68,8 @@ export function labelOf(pointer, hasManyDampers = false) {
 // material stand for nothing of their own where the material varies; what varies along with an earlier input is left out.
 export function varyingInputs(scenes, schema) {
   const flat = scenes.map(flatten);
-  const hasManyDampers = scenes.some((scene) => scene.dampers?.length > 1);
+  const withMany = scenes.filter((scene) => scene.dampers?.length > 1);
+  const hasManyDampers = 2 * withMany.length > scenes.length;
   const pointers = [...new Set(flat.flatMap((inputs) => [...inputs.keys()]))];
   const all = pointers.map((pointer) => ({
     pointer,
