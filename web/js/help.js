@@ -1,8 +1,8 @@
 // Headings that have a "?" beside them, and the places of the guide that it leads to.
 export const places = {
-  Scene: "tutorial",
+  Scene: "dashboard#describe-a-scene",
   Runs: "studies#progress-and-cancel",
-  Compare: "concepts#channels",
+  Compare: "dashboard#compare",
   Materials: "materials",
   "Ground motions": "ground-motions",
   Structure: "scene#structure-kinds",
