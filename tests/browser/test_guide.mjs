@@ -89,7 +89,7 @@ test("In a narrow window the pages and the headings of a page open from buttons,
 test("Light or dark is one choice for the dashboard and the guide", async ({ page, url }) => {
   await page.goto(url("guide/"));
   await page.getByRole("button", { name: "Use dark colours" }).click();
-  await page.getByRole("link", { name: "Dashboard" }).click();
+  await page.getByRole("navigation", { name: "Service" }).getByRole("link", { name: "Dashboard" }).click();
   await page.getByRole("button", { name: "Use light colours" }).waitFor();
   await page.getByRole("link", { name: "Guide: Estimate" }).click();
   await page.waitForURL(/studies\.html#cost-and-limits$/);
