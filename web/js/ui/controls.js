@@ -181,8 +181,26 @@ export function Tabs({ label, tabs, chosen, onChoose }) {
   </section>`;
 }
 
+const MOST_BUTTONS = 8;
+
+// One of many: [{value, label}] as a list that opens.
+const ChoiceList = ({ label, options, value, onChange }) =>
+  html`<select
+    aria-label=${label}
+    onChange=${(event) => onChange(options[event.currentTarget.selectedIndex].value)}
+  >
+    ${options.map(
+      (option) => html`<option selected=${option.value === value}>${option.label}</option>`,
+    )}
+  </select>`;
+
 // One of a few: [{value, label}] as buttons side by side.
-export const Choice = ({ label, options, value, onChange }) =>
+export const Choice = (props) =>
+  props.options.length > MOST_BUTTONS
+    ? html`<${ChoiceList} ...${props} />`
+    : html`<${ChoiceButtons} ...${props} />`;
+
+const ChoiceButtons = ({ label, options, value, onChange }) =>
   html`<div class="choice" role="group" aria-label=${label}>
     ${options.map(
       (option) =>
