@@ -299,6 +299,8 @@ def test_results_never_change():
         reply = daemon.get("/v1/materials/sponge")
         known = daemon.get("/v1/materials/sponge", headers={"If-None-Match": reply.headers["etag"]})
         assert known.status == 304 and "immutable" not in reply.headers["cache-control"], known
+        landing = daemon.get("/", headers={"Accept": "text/html"}).headers["etag"]
+        assert daemon.get("/", headers={"Accept": "text/html", "If-None-Match": landing}).status == 304
 
 
 def test_refusals_are_not_kept():
