@@ -32,7 +32,7 @@ try {
   const result = list.find(({ name }) => name === "result");
   if (result) {
     const page = await (await browser.newContext({ viewport: { width: 1280, height: 900 }, colorScheme: "light" })).newPage();
-    await settle(page, `${daemon.url}/${result.hash}`, result);
+    await settle(page, `${daemon.url}/${result.hash}?t=0.122`, result); // in a contact
     await page.screenshot({ path: path.join(folder, "dashboard.png"), animations: "disabled" });
   }
   console.log(`${list.length} pages in ${folder}`);
