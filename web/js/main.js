@@ -43,6 +43,10 @@ function nameOf([first = "scene", one, part]) {
   return one ? first.slice(0, -1) : first;
 }
 
+// What is of one thing has its name; parts belong to their page alone.
+const ADDRESSES =
+  /^(|scene|compare|shell|jobs(\/[^/]+)?|results\/[^/]+(\/report)?|materials(\/[^/]+(\/measure)?)?|records(\/[^/]+)?)$/;
+
 async function show() {
   const last = current;
   if (last?.path === read().path.join("/")) {
@@ -91,7 +95,7 @@ async function open(address, signal, isNext) {
   welcome(welcomeBox, first === "scene");
   try {
     const name = nameOf(address.path);
-    if (!Object.hasOwn(pages, name))
+    if (!Object.hasOwn(pages, name) || !address.path.join("/").match(ADDRESSES))
       throw new Error(`There is no page "${address.path.join("/")}" here.`);
     const { page } = await pages[name]();
     if (signal.aborted) return null;

@@ -43,6 +43,10 @@ function wholeDomain(x, series) {
   return paddedDomain(extentOf(series.map(placesOf), x.log), x.log, hasPoints ? 0.04 : 0);
 }
 
+// What an address asks for may be no part of an axis.
+const usable = (range, isLog) =>
+  Array.isArray(range) && range[1] > range[0] && (!isLog || range[0] > 0) ? range : null;
+
 function valueDomain(y, series, rules, domain) {
   if (y.domain) return y.domain;
   if (y.categories) return [y.categories.length - 0.5, -0.5];
@@ -84,7 +88,7 @@ export function Chart(props) {
 
   const series = props.series.filter((one) => !hidden.has(one.label));
   const whole = wholeDomain(x, props.series);
-  const range = (props.onRange ? props.range : ownRange) ?? null;
+  const range = usable((props.onRange ? props.range : ownRange) ?? null, x.log);
   const domain = range ?? whole;
   const top = MARGIN.top + (markers.length > 0 ? MARGIN.marks : 0);
   const bottom = top + height;

@@ -34,10 +34,11 @@ function roundStep(least) {
 function linearTicks([low, high], most) {
   if (!(high > low)) return [low];
   const step = roundStep((high - low) / Math.max(1, most));
-  const ticks = [];
-  for (let at = Math.ceil(low / step - 1e-9); at * step <= high + step * 1e-9; at++)
-    ticks.push(Number((at * step).toPrecision(12)));
-  return ticks;
+  const first = Math.ceil(low / step - 1e-9);
+  const count = Math.floor(high / step + 1e-9) - first + 1;
+  // Beyond the digits of numbers there are no ticks between the ends.
+  if (!(count >= 1 && count < 1000) || Math.abs(first) > 1e12) return [low];
+  return Array.from({ length: count }, (_, at) => Number(((first + at) * step).toPrecision(12)));
 }
 
 // Ticks of a decade by how many have room.
@@ -49,6 +50,7 @@ const DECADES = [
 
 // At 1 to 9 of a decade, at 1, 2 and 5, or at some powers of ten, as there is room.
 function logTicks([low, high], most) {
+  if (!(low > 0 && high > low && high < Infinity)) return [];
   const decades = Math.log10(high / low);
   const room = most / Math.max(0.3, decades); // ticks in a decade
   const [, digits] = DECADES.find(([least]) => room >= least);

@@ -34,7 +34,7 @@ function usualPace({ plan }) {
 }
 
 // The motion's states and trails: {missing, stateAt(t), trailAt(t, pace)}; null while data are on their way.
-function useMotion({ result, path, signal }, model, onPiece, onFailure) {
+function useMotion({ result, path, signal }, model, { onPiece, onFailure, onPause }) {
   return useMemo(() => {
     const made = channelsOf(model, channelNames(result));
     if (made.missing.length > 0) return made;
@@ -46,6 +46,7 @@ function useMotion({ result, path, signal }, model, onPiece, onFailure) {
       signal,
       onPiece,
       onFailure,
+      onPause,
     });
     const stateAt = (t, isAhead) => {
       const value = frames.at(t, isAhead);
@@ -214,8 +215,14 @@ export function Animation() {
   const [pace, setPace] = useState(() => usualPace(result));
   const [isLooped, setIsLooped] = useState(false);
   const model = useMemo(() => modelOf(result.scene, result.plan), [result.id, units]);
-  const fail = (problem) => setError(problem);
-  const motion = useMotion(context, model, redraw, fail);
+  const motion = useMotion(context, model, {
+    onPiece: () => {
+      setError(null);
+      redraw();
+    },
+    onFailure: setError,
+    onPause: redraw,
+  });
   const window = useWindow(context);
   const cursor = cursorOf("time");
   const follow = (x) => cursor.set(x === null ? null : { x, y: null, owner: null });

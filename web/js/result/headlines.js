@@ -51,6 +51,7 @@ export function ResultHeadlines() {
   const { result } = useResult();
   const { summary, units, scene } = result;
   const hasDamper = scene.dampers.length > 0;
+  const isImpulse = result.plan.contact_model === "impulse";
   const items = [
     effect(
       hasDamper ? "Motion, rms" : "Displacement, rms",
@@ -70,7 +71,8 @@ export function ResultHeadlines() {
     hasDamper && { label: "Impacts", value: number(summary.impacts, 7), place: "concepts#impacts" },
     hasDamper && {
       label: "Largest force",
-      value: quantity(summary.peak_contact_force, "N"),
+      value: isImpulse ? "–" : quantity(summary.peak_contact_force, "N"),
+      note: isImpulse && "impulses take no time",
       place: "concepts#impacts",
     },
     accuracy(summary),

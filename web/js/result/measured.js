@@ -237,7 +237,8 @@ function Overlay({ series, measured, shift, channel }) {
   const window = windowOf(result, query);
   const isGiven = query.from !== undefined || query.to !== undefined;
   const quiet = Math.min(window.end, 1.1 * timeOfEnergy(series.time, series.values));
-  const range = isGiven ? [window.from, window.to] : [0, Number(quiet.toPrecision(2))];
+  const range =
+    isGiven || !(quiet > 0) ? [window.from, window.to] : [0, Number(quiet.toPrecision(2))];
   const setRange = (next) => {
     const ends = (next ?? [0, window.end]).map((end) => Number(end.toPrecision(8)));
     change({ from: ends[0], to: ends[1] }, true);

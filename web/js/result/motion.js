@@ -65,9 +65,15 @@ function chartsOf(result) {
   return charts;
 }
 
-const usual = (charts) =>
+// Impulses have no force over time.
+const usual = (charts, { plan }) =>
   charts
-    .filter(({ key }) => key === "displacement" || key === "relative_1" || key === "contact_force")
+    .filter(
+      ({ key }) =>
+        key === "displacement" ||
+        key === "relative_1" ||
+        (key === "contact_force" && plan.contact_model !== "impulse"),
+    )
     .map(({ key }) => key);
 
 // The walls of a damper's cavity as the free mass' middle meets them.
@@ -127,7 +133,7 @@ export function Motion() {
   }, []);
   const charts = useMemo(() => chartsOf(result), [result.id]);
   const named = query.channels?.split(",");
-  const chosen = charts.filter(({ key }) => (named ?? usual(charts)).includes(key));
+  const chosen = charts.filter(({ key }) => (named ?? usual(charts, result)).includes(key));
   const shown = chosen.length > 0 || named ? chosen : charts.slice(0, 1);
   const channels = [...new Set(shown.flatMap((chart) => chart.channels))];
   const isAuto = query.from === undefined && query.to === undefined;
@@ -147,7 +153,8 @@ export function Motion() {
     const column = loaded.data?.columns.get(channels[0]);
     if (!column?.values || result.count > column.values.length) return null;
     const until = timeOfEnergy(loaded.data.time, column.values) * 1.1;
-    return until < QUIET_PART * window.end ? Number(until.toPrecision(2)) : null;
+    const isQuiet = until > 0 && until < QUIET_PART * window.end;
+    return isQuiet ? Number(until.toPrecision(2)) : null;
   }, [loaded.data]);
   const range = isAuto ? quiet && [0, quiet] : [window.from, window.to];
   useEffect(() => context.shown.set(range), [range?.[0], range?.[1]]);

@@ -7,6 +7,7 @@ import { isSame } from "./scenes.js";
 // "70.2 ×", "+4.2 %"; "" where that says nothing.
 export function changeText(value, first) {
   const ratio = value / first;
+  if (ratio < 0) return ""; // across zero a ratio says nothing
   if (typeof value !== "number" || !Number.isFinite(ratio) || Math.abs(ratio - 1) < 1e-9) return "";
   if (ratio < 0.1 || ratio > 2) return `${number(ratio, 3)} ×`;
   const sign = ratio > 1 ? "+" : "−";

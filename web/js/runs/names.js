@@ -10,9 +10,12 @@ const partText = ({ label, unit }, value) =>
   typeof value === "number" ? `${label} ${valueText(value, unit)}` : valueText(value);
 
 function studyText({ kind, axes, variables, parameters }) {
-  const varied = (axes ?? variables ?? parameters ?? [])
-    .flatMap(({ pointer, pointers }) => pointer ?? pointers)
-    .map((pointer) => labelOf(pointer));
+  // Of a sensitivity study the parameters are words.
+  const nameOf = (one) =>
+    typeof one === "string"
+      ? [words(one)]
+      : [one.pointer ?? one.pointers].flat().map((pointer) => labelOf(pointer));
+  const varied = (axes ?? variables ?? parameters ?? []).flatMap(nameOf);
   return varied.length > 0 ? `${kind}: ${varied.join(" and ")}` : kind;
 }
 

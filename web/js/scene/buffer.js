@@ -52,7 +52,7 @@ function BufferFields({ pointer, label, schema, draft, stop }) {
         : null,
     [slug, hasRevisions],
   );
-  const known = revisions.data?.slug === slug ? revisions.data.list : [];
+  const known = revisions.data && revisions.data.slug === slug ? revisions.data.list : [];
   const { material: _, ...properties } = schema.anyOf.find((each) => each.properties).properties;
   const own = useMemo(() => ({ properties }), [schema]);
   const error = materials.error ?? (hasRevisions ? revisions.error : null);

@@ -5,12 +5,15 @@ import { limit } from "./model.js";
 
 const PIECE = 6000; // numbers, few so that the first piece comes soon
 const MOST_PIECES = 8; // kept
+const PAUSE = 3000; // ms between two tries
 
 // `channels` are names; at(t) is null while the piece is on its way, then (name) -> value at t; `onPiece()` is called when one
-// has come, `onFailure(error)` when none does.
-export function makeFrames({ path, rate, channels, end, signal, onPiece, onFailure }) {
+// has come, `onFailure(error)` when none does, `onPause()` when it is time to
+// ask again.
+export function makeFrames({ path, rate, channels, end, signal, onPiece, onFailure, onPause }) {
   const length = Math.max(1, Math.floor(PIECE / Math.max(1, channels.length))) / rate; // of a piece (s)
   const pieces = new Map(); // by number: null while on its way
+  let pausedUntil = 0; // after a failure
   async function load(number) {
     pieces.set(number, null);
     const from = number * length;
@@ -26,12 +29,17 @@ export function makeFrames({ path, rate, channels, end, signal, onPiece, onFailu
       onPiece();
     } catch (error) {
       pieces.delete(number);
-      if (error.name !== "AbortError") onFailure(error);
+      if (error.name === "AbortError") return;
+      // A server that is away is asked again after a while, one that refuses is not.
+      const isAway = error.status === 0 || error.status >= 500;
+      pausedUntil = isAway ? performance.now() + PAUSE : Infinity;
+      if (isAway) setTimeout(() => signal.aborted || onPause(), PAUSE + 50);
+      onFailure(error);
     }
   }
   function piece(number) {
     if (number < 0 || number * length > end) return undefined;
-    if (!pieces.has(number)) load(number);
+    if (!pieces.has(number) && performance.now() >= pausedUntil) load(number);
     return pieces.get(number);
   }
   return {

@@ -73,9 +73,13 @@ export function EnsembleStudy() {
     />`;
 }
 
+// Sobol indices take runs of their own.
+const runsText = (count, runs) =>
+  count === runs ? `${runs} runs.` : `${count} runs, ${runs} with those for the Sobol indices.`;
+
 const Lead = ({ one, metric, study: { runs, confidence }, more }) =>
   html`<${Decision} more=${more}>
-    ${`Mean ${words(metric)} ${quantity(one.mean, one.unit)} (${number(100 * confidence, 3)} %: ${between(one.low, one.high, one.unit)}); 90 of 100 runs have ${between(one.q05, one.q95, one.unit)}. ${runs} runs.`}
+    ${`Mean ${words(metric)} ${quantity(one.mean, one.unit)} (${number(100 * confidence, 3)} %: ${between(one.low, one.high, one.unit)}); 90 of 100 runs have ${between(one.q05, one.q95, one.unit)}. ${runsText(one.count, runs)}`}
   <//>`;
 
 function Distribution({ study, metric, given, shape }) {
@@ -213,7 +217,7 @@ function Numbers({ statistics, known, scene, inputs, runs }) {
   ];
   const rows = known.map((metric) => ({ ...statistics[metric], metric }));
   return html`<${Table}
-    caption=${`Each metric over ${runs} runs`}
+    caption=${`Each metric over ${rows[0]?.count ?? runs} runs`}
     columns=${columns}
     rows=${rows}
   />`;

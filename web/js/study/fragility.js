@@ -105,7 +105,7 @@ export function FragilityStudy() {
       heading="Probability of exceeding the limit"
       height=${320}
       x=${{ label: measure, unit: "m/s^2" }}
-      y=${{ label: "Probability", unit: "1", domain: [0, 1] }}
+      y=${{ label: "Probability", unit: "1", domain: [-0.03, 1.03] }}
       series=${series}
       rules=${hasFit ? [{ x: limit.median, label: "median", color: "quiet" }] : []}
     />

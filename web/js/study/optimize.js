@@ -61,7 +61,11 @@ function decisionOf({ best, given, undamped, objectives }, units, values) {
   const range = interval ? ` (95 %: ${between(...interval, unit)})` : "";
   const isSingle = objectives.length === 1;
   const lead = isSingle ? "Best" : "A good compromise";
-  return `${lead}: ${values(best.values)}. ${title(metric)} ${quantity(value, unit)}${range}, ${against.join(" and ")}.`;
+  const others = best.objectives.slice(1).map((one) => {
+    const before = given.metrics[one.metric];
+    return ` ${title(one.metric)} ${quantity(one.value, units[one.metric])}, given ${quantity(before, units[one.metric])}.`;
+  });
+  return `${lead}: ${values(best.values)}. ${title(metric)} ${quantity(value, unit)}${range}, ${against.join(" and ")}.${others.join("")}`;
 }
 
 // Metrics of the best, the given scene and the structure without dampers, each as a part of the last.

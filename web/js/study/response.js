@@ -22,15 +22,23 @@ function lineOf(points, metric, isWanted) {
     line.points.push(point);
   };
   for (const branch of Map.groupBy(points, ({ branch: number }) => number).values()) {
-    let isOpen = false;
+    let length = 0; // of the line that is open
+    const add = (point) => {
+      push(point);
+      length++;
+    };
+    const end = () => {
+      if (length === 1) push(line.points.at(-1)); // a dot
+      if (length > 0) push(null);
+      length = 0;
+    };
     branch.forEach((point, at) => {
       const isIn = isWanted(point);
-      if (isIn && !isOpen && at > 0 && branch[at - 1].period) push(branch[at - 1]);
-      if (isIn) push(point);
-      if (!isIn && isOpen) push(null);
-      isOpen = isIn;
+      if (isIn && length === 0 && at > 0 && branch[at - 1].period) add(branch[at - 1]);
+      if (isIn) add(point);
+      else end();
     });
-    if (isOpen) push(null);
+    end();
   }
   return line;
 }

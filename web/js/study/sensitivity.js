@@ -77,14 +77,13 @@ function Tornado({ response, metric }) {
       text: `${derivative > 0 ? "+" : ""}${number(derivative, 2)} %${isSettled ? "" : ", not settled"}`,
     }),
   );
+  const hasGrey = rows.some(({ color }) => color === "ghost");
   return html`<${Bars}
       title=${`Slopes of the ${words(metric)}`}
       x=${{ label: `Change of the ${words(metric)} for 1 % more of each [%]`, unit: "1" }}
       rows=${rows}
     />
-    <p class="hint">
-      Grey: the slope does not settle as the step shrinks, so it is no derivative.
-    </p>`;
+    ${hasGrey && html`<p class="hint">Grey: the slope does not settle as the step shrinks, so it is no derivative.</p>`}`;
 }
 
 function Spread({ statistics, made, errors }) {

@@ -287,7 +287,7 @@ function Picture(props) {
       );
   const isBars = picture.kind === "bars";
   const shown = series.map((one) => (isBars ? { ...one, kind: "bars", width: 0.6 } : one));
-  const isLogY = metric.low > 0 && metric.high > 50 * metric.low;
+  const isLogY = !isBars && metric.low > 0 && metric.high > 50 * metric.low; // bars begin at 0
   const description =
     best >= 0
       ? `Least ${quantity(metric.low, metric.unit)} at ${placeText(model, best)}, largest ${quantity(metric.high, metric.unit)}.`

@@ -31,7 +31,7 @@ function metricOf(key, { unit, values }) {
     values,
     low,
     high,
-    spread: largest > 0 ? (high - low) / largest : 0,
+    spread: largest > 0 && high - low > 1e-9 * largest ? (high - low) / largest : 0, // else rounding
     isDecisive: isSmallerBetter(key),
   };
 }

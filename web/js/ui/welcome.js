@@ -15,7 +15,7 @@ function Welcome() {
   return html`<section class="notice welcome" aria-label="First visit">
     <p>
       <strong>New here?</strong>
-      ${" This is the damper of the paper. Drag its stops, ball or pads: the curves follow. Run keeps the result. "}
+      ${" This scene runs while you change it: drag a stop, the ball or a pad in the drawing. Run keeps the result. "}
       <a href="guide/tutorial.html">Tutorial</a>
     </p>
     <button type="button" class="quiet" onClick=${close}>Close the hint</button>
