@@ -51,6 +51,24 @@ test("A sweep over two numbers is contours: colours with numbers, the value unde
   assert.deepEqual(await axe(page), []);
 });
 
+test("A sweep by keyboard: the best point of contours opens, a small chart becomes the large one", async ({ page, daemon, url }) => {
+  const axes = [{ pointer: "/dampers/0/mass", from: 0.05, to: 0.2, count: 4 }, { pointer: "/dampers/0/clearance", from: 0.005, to: 0.03, count: 5 }];
+  const job = await daemon.run("paper_free_sponge", { study: { kind: "sweep", axes, metrics: ["rms_displacement", "peak_contact_force"] } });
+  await page.goto(url(`#/results/${job.result}?metric=rms_displacement`));
+  const { columns } = await daemon.get(`/v1/results/${job.result}/table.json`);
+  const values = columns.rms_displacement.values;
+  const best = columns.index.values[values.indexOf(Math.min(...values))];
+  await page.getByRole("button", { name: "Open the best one" }).press("Enter");
+  await leads(page, new RegExp(`point=${best}\\b`));
+  await page.getByRole("button", { name: "Enlarge: Peak contact force" }).press("Enter");
+  await leads(page, /metric=peak_contact_force/);
+  await says(page.getByRole("main"), /Least peak contact force: [\d.]+ N at mass/);
+  await page.getByRole("button", { name: "Enlarge: RMS displacement" }).waitFor();
+  assert.deepEqual(await axe(page), []);
+  await page.goBack();
+  await page.getByRole("button", { name: "Enlarge: Peak contact force" }).waitFor();
+});
+
 test("A study's chart opened by itself has its colours, light and dark", async ({ daemon, newPage }) => {
   const { result } = await daemon.run("compare_sponge");
   const fills = await Promise.all(["light", "dark"].map(async (colorScheme) => {
@@ -188,6 +206,10 @@ test("Response: the largest motion against that without dampers; stable, unstabl
   const main = await open(page, daemon, url, "response_sponge");
   await says(main, /The largest displacement is [\d.]+ mm at excitation frequency [\d.]+ Hz, [\d.]+ % below the largest without dampers/);
   await says(page.getByRole("figure", { name: "Response curve" }), /without dampers[^]*stable[^]*unstable/);
+  const curve = page.getByRole("application", { name: "Response curve" });
+  const { width, height } = await curve.boundingBox();
+  await curve.hover({ position: { x: width / 2, y: height / 2 } });
+  await says(page.getByRole("figure", { name: "Response curve" }), /stable [\d.]+ mm, period \d+ cycles?, \d+ impacts?/);
   await page.getByText("All points as a table").click();
   await says(page.getByRole("table", { name: "Points" }), /3\.0*\s+up\s+1\s+2\s+yes\s+4\.95\d*\s+3\.50\d*/);
   await open(page, daemon, url, "ensemble_inputs");

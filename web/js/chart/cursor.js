@@ -33,7 +33,8 @@ export function valuesAt(series, x, y) {
         : [];
     }
     const value = one.y[index];
-    const text = y.categories ? y.categories[value] : quantity(value, unit);
+    const read = y.categories ? y.categories[value] : quantity(value, unit);
+    const text = one.notes?.[index] ? `${read}, ${one.notes[index]}` : read;
     return isValue(value) ? [{ series: one, index, text, x: one.x[index], y: value }] : [];
   });
 }

@@ -12,14 +12,24 @@ import { Decision, memberName, sentence } from "./parts.js";
 const STABLE = { true: "yes", false: "no" };
 const METRICS = ["peak_displacement", "rms_displacement"];
 
+const counted = (count, name) => `${count} ${name}${count === 1 ? "" : "s"}`;
+
+// What the tooltip adds to an amplitude: "period 1 cycle, 2 impacts".
+function noteOf(point) {
+  if (!point?.period) return "";
+  const impacts = point.impacts_per_period;
+  const period = `period ${counted(point.period, "cycle")}`;
+  return Number.isFinite(impacts) ? `${period}, ${counted(impacts, "impact")}` : period;
+}
+
 // Points of one branch and one kind as a line; a gap (NaN) parts it from the next. A line goes on to the first point of the
 // other kind.
 function lineOf(points, metric, isWanted) {
-  const line = { x: [], y: [], points: [] };
+  const line = { x: [], y: [], notes: [] };
   const push = (point) => {
     line.x.push(point?.value ?? NaN);
     line.y.push(point?.[metric] ?? NaN);
-    line.points.push(point);
+    line.notes.push(noteOf(point));
   };
   for (const branch of Map.groupBy(points, ({ branch: number }) => number).values()) {
     let length = 0; // of the line that is open

@@ -162,6 +162,7 @@ function SweepView({ answer, given, jobId, query, change }) {
       answer=${answer}
       model=${model}
       chosen=${chosen}
+      best=${best}
       sceneOf=${sceneOf}
       pick=${pick}
       isDrawn=${isDrawn}
@@ -172,18 +173,26 @@ function SweepView({ answer, given, jobId, query, change }) {
       html`<div class="multiples">
         ${others.map(
           (one) =>
-            html`<${Picture}
-              key=${one.key}
-              model=${model}
-              picture=${picture}
-              metric=${one}
-              best=${isLoads ? -1 : bestRow(one)}
-              chosen=${chosen}
-              given=${isLoads ? null : given}
-              pick=${pick}
-              height=${110}
-              isSmall
-            />`,
+            html`<div key=${one.key}>
+              <${Picture}
+                model=${model}
+                picture=${picture}
+                metric=${one}
+                best=${isLoads ? -1 : bestRow(one)}
+                chosen=${chosen}
+                given=${isLoads ? null : given}
+                pick=${pick}
+                height=${110}
+                isSmall
+              />
+              <button
+                type="button"
+                class="link no-print"
+                onClick=${() => change({ metric: one.key }, true)}
+              >
+                ${`Enlarge: ${one.label}`}
+              </button>
+            </div>`,
         )}
       </div>`
     }

@@ -9,9 +9,17 @@ import { positionsOf, rowAt } from "./sweep_model.js";
 const MOST_ROWS = 1000; // of the table
 
 // The point that is chosen: its numbers, its run, its scene. Other points are a step along an axis away.
-export function Point({ answer, model, chosen, sceneOf, pick, isDrawn }) {
-  if (chosen === undefined)
-    return isDrawn && html`<p class="hint">A click on the chart opens a point.</p>`;
+export function Point({ answer, model, chosen, best, sceneOf, pick, isDrawn }) {
+  if (chosen === undefined) {
+    if (!isDrawn) return null;
+    const first = best >= 0 ? best : 0;
+    return html`<p class="hint">
+      ${"A click on the chart opens a point. "}
+      <button type="button" class="link" onClick=${() => pick(first)}>
+        ${best >= 0 ? "Open the best one" : "Open the first one"}
+      </button>
+    </p>`;
+  }
   const index = model.indices[chosen];
   const positions = positionsOf(model, chosen);
   const figures = [
