@@ -33,12 +33,14 @@ function lineOf(points, metric, isWanted) {
   };
   for (const branch of Map.groupBy(points, ({ branch: number }) => number).values()) {
     let length = 0; // of the line that is open
+    let last = null;
     const add = (point) => {
       push(point);
+      last = point;
       length++;
     };
     const end = () => {
-      if (length === 1) push(line.points.at(-1)); // a dot
+      if (length === 1) push(last); // a dot
       if (length > 0) push(null);
       length = 0;
     };
