@@ -10,9 +10,8 @@ import { askToken } from "./ui/token_dialog.js";
 import { UnitsMenu } from "./ui/units_menu.js";
 import { welcome } from "./ui/welcome.js";
 
-// A module's `page` is {title(address), show(host, address, signal)}; show may return, or promise, {change(address)?, redraw()?,
-// leave()?}: for a new query on the same path (false: show it anew), for other units (without it: show it anew), and for the end,
-// when `signal` is aborted.
+// A module's `page` is {title(address), show(host, address, signal) -> {change(address), redraw(), leave()}}: for a new query on
+// the same path, for other units, and for the end, when `signal` is aborted.
 const pages = {
   scene: () => import("./scene/page.js"),
   jobs: () => import("./runs/runs.js"),
@@ -52,29 +51,19 @@ async function show() {
   if (last?.path === read().path.join("/")) {
     const controller = await last.controller;
     if (last !== current) return; // another one has come meanwhile
-    if (controller?.change && controller.change(read()) !== false) return;
+    if (controller) {
+      controller.change(read());
+      return;
+    }
   }
-  showAnew(last);
-}
-
-async function redraw() {
-  const last = current;
-  const controller = await last.controller;
-  if (last !== current) return;
-  if (controller?.redraw) controller.redraw();
-  else showAnew(last, true);
-}
-
-// With `isStill` the reader stays where the page and the focus are.
-function showAnew(last, isStill = false) {
   last?.stop.abort();
-  last?.controller.then((controller) => controller?.leave?.());
+  last?.controller.then((controller) => controller?.leave());
   const address = read();
   const stop = new AbortController();
   current = {
     path: address.path.join("/"),
     stop,
-    controller: open(address, stop.signal, last !== null && !isStill),
+    controller: open(address, stop.signal, last !== null),
   };
 }
 
@@ -108,7 +97,7 @@ async function open(address, signal, isNext) {
       main.focus({ preventScroll: true });
       announce(title);
     }
-    return await page.show(host, address, signal);
+    return page.show(host, address, signal);
   } catch (error) {
     if (signal.aborted) return null;
     if (main.querySelector(".page h1") === null)
@@ -121,7 +110,7 @@ async function open(address, signal, isNext) {
 
 themed(document.getElementById("theme"));
 render(html`<${UnitsMenu} />`, document.getElementById("units"));
-settings.subscribe(redraw);
+settings.subscribe(async () => (await current.controller)?.redraw());
 
 const updateTokenButton = () => {
   tokenButton.hidden = !token();

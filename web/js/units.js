@@ -75,7 +75,8 @@ export const words = (name) =>
     .replaceAll("_", " ")
     .replace(/\brms\b/g, "RMS")
     .replace(/\bpsd\b/g, "PSD");
-export const title = (name) => words(name).replace(/^./, (letter) => letter.toUpperCase());
+export const capital = (text) => text.replace(/^./, (letter) => letter.toUpperCase());
+export const title = (name) => capital(words(name));
 
 // A time of day: "14:03" today, "21 Nov 2026, 14:03" before.
 export function moment(text) {

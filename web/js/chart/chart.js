@@ -4,6 +4,7 @@ import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.j
 import { Help, withSubscripts } from "../ui/controls.js";
 import { announce } from "../ui/announce.js";
 import { freshId } from "../ui/ids.js";
+import { useWidth } from "../ui/width.js";
 import { quantity } from "../units.js";
 import { axisUnit, XAxis, YAxis } from "./axis.js";
 import { Cursor, cursorOf } from "./cursor.js";
@@ -15,19 +16,6 @@ import { extentOf, linearScale, logScale, paddedDomain } from "./scale.js";
 import { drawSeries, valuesInView } from "./series.js";
 
 export const MARGIN = { left: 58, right: 14, top: 8, bottom: 22, marks: 14 };
-
-// The pixels that an element is wide; it is drawn again when they change.
-function useWidth(ref) {
-  const [width, setWidth] = useState(0);
-  useLayoutEffect(() => {
-    const measure = () => setWidth(Math.round(ref.current?.clientWidth ?? 0));
-    measure();
-    const observer = new ResizeObserver(measure);
-    observer.observe(ref.current);
-    return () => observer.disconnect();
-  }, []);
-  return width;
-}
 
 // The ends of what a series covers: bars reach half their width beyond their places.
 function placesOf({ kind, x, width }) {

@@ -9,9 +9,3 @@ export const place = (pointer) =>
     .join(", ")
     .replace("axes", "axis")
     .replace(/(?<!i)s?, (\d+)/g, (_, at) => ` ${Number(at) + 1}`);
-
-// The unit of such a place, by its name in the schema's text.
-export const unitOf = (pointer, text) => {
-  const [, name] = /([a-z_]+)[/\d]*$/.exec(pointer);
-  return RegExp(`"${name}":{[^{}]*"x-unit":"([^"]*)`).exec(text)?.[1];
-};

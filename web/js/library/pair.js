@@ -1,4 +1,4 @@
-// What a material comes to between two masses: k_b and c_b with their uncertainty, where they hold, and the force of an impact.
+// The contact of a material between two masses: k_b and c_b with their uncertainty, where they hold, and the force of an impact.
 import { note, read } from "../address.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";

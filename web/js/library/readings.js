@@ -3,7 +3,7 @@ import { Chart } from "../chart/chart.js";
 import { extentOf, paddedDomain } from "../chart/scale.js";
 import { Headlines } from "../ui/controls.js";
 import { html } from "../ui/preact.js";
-import { quantity } from "../units.js";
+import { capital, quantity } from "../units.js";
 import { QUANTITIES, range } from "./format.js";
 
 // e and T_c with their intervals: [{label, value, note}].
@@ -68,8 +68,7 @@ function seriesOf({ name, color }, rows, statistics, domain) {
   ].filter((series) => series && series.x.length > 0);
 }
 
-const sentence = (text) =>
-  `${text.replace(/^./, (letter) => letter.toUpperCase()).replaceAll("+-", "±")}.`;
+const sentence = (text) => `${capital(text).replaceAll("+-", "±")}.`;
 
 function ReadingsChart({ quantity: shown, evaluation, isSaid }) {
   const { name, label, unit } = shown;

@@ -2,7 +2,8 @@
 // the charts' cursor goes along.
 import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
 import { cursorOf } from "../chart/cursor.js";
-import { Picture, useRoom } from "../scene/drawing.js";
+import { Picture } from "../scene/drawing.js";
+import { useWidth } from "../ui/width.js";
 import { channelsOf, makeFrames } from "../scene/frames.js";
 import { layoutOf } from "../scene/layout.js";
 import { limit, modelOf } from "../scene/model.js";
@@ -209,7 +210,7 @@ export function Animation() {
   const { result, query, ledger, change } = context;
   const units = useStore(settings);
   const box = useRef(null);
-  const width = useRoom(box, 240, 720);
+  const width = useWidth(box, 240, 720);
   const [, redraw] = useReducer((count) => count + 1, 0);
   const [error, setError] = useState(null);
   const [pace, setPace] = useState(() => usualPace(result));

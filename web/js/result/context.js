@@ -8,21 +8,24 @@ import { Ledger } from "./ledger.js";
 export const ResultContext = createContext(null);
 export const useResult = () => useContext(ResultContext);
 
+// The latest jobs of a result.
+export async function jobsOf(id, signal) {
+  return (await get("v1/jobs", { result: id, limit: 20 }, signal)).jobs;
+}
+
 // {result, path, query, change, ledger, jobs (a promise of the latest), signal}: `query` is the address as it is now; change()
 // writes to it, and what shows the context is drawn again. `shown` is a store of the part of the time that charts show, null is all.
-export function useResultContext(result, signal) {
+export function useResultContext(result, signal, jobs) {
   const [, redraw] = useState(0);
   const path = `v1/results/${result.id}`;
   const kept = useMemo(() => {
-    const jobs = get("v1/jobs", { result: result.id, limit: 20 }).then((answer) => answer.jobs);
-    jobs.catch(() => {}); // who shows them says so
-    return { jobs, ledger: new Ledger({ path, result }), shown: createStore(null) };
+    return { ledger: new Ledger({ path, result }), shown: createStore(null) };
   }, [result.id]);
   const change = (changes, push = false) => {
     note(changes, push);
     redraw((count) => count + 1);
   };
-  return { result, path, query: read().query, change, signal, ...kept };
+  return { result, path, query: read().query, change, signal, jobs, ...kept };
 }
 
 // The window of time in view: {from, to, end}; the whole unless the query says otherwise.

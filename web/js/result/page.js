@@ -1,13 +1,13 @@
 // A result: the six numbers, the motion beside its animation and the selected impact, and everything else in tabs.
-import { html, useState } from "../ui/preact.js";
+import { html, useMemo, useState } from "../ui/preact.js";
 import { link } from "../address.js";
-import { get, session } from "../api.js";
+import { get } from "../api.js";
 import { Failure, Loaded, Notice, Panel, Tabs } from "../ui/controls.js";
-import { useLoaded, useStore } from "../ui/store.js";
+import { useLoaded } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
 import { Animation } from "./animation.js";
 import { CompareMenu } from "./compare_menu.js";
-import { ResultContext, useResultContext } from "./context.js";
+import { ResultContext, jobsOf, useResultContext } from "./context.js";
 import { Energy } from "./energy.js";
 import { Files } from "./files.js";
 import { ResultHeadlines } from "./headlines.js";
@@ -21,8 +21,8 @@ import { Method } from "./method.js";
 import { Motion } from "./motion.js";
 import { Spectrum } from "./spectrum.js";
 
-export function ResultView({ result, signal }) {
-  const context = useResultContext(result, signal);
+export function ResultView({ result, signal, jobs }) {
+  const context = useResultContext(result, signal, jobs);
   const { query: view, change } = context;
   const tabs = [
     { name: "impacts", title: "Impacts", view: () => html`<${ImpactTable} />` },
@@ -69,12 +69,12 @@ const Warnings = ({ warnings }) =>
   <//>`;
 
 // A study: its own view; the run of the scene without it can be opened below.
-function StudyView({ result, query, signal }) {
+function StudyView({ result, signal, jobs }) {
   const [isOpen, setIsOpen] = useState(false);
   const { kind } = result.study;
   const { title, load } = KINDS[kind];
   const loaded = useLoaded(load, [kind]);
-  const context = useResultContext(result, signal);
+  const context = useResultContext(result, signal, jobs);
   return html`<${ResultContext.Provider} value=${context}>
       <${Panel} title=${title} help=${title}>
         <${Loaded} loaded=${loaded}>${(View) => html`<${View} />`}<//>
@@ -87,23 +87,15 @@ function StudyView({ result, query, signal }) {
     <//>
     <details onToggle=${(event) => setIsOpen(event.currentTarget.open)}>
       <summary>The run of the unchanged scene, without the study</summary>
-      ${isOpen && html`<${ResultView} result=${result} query=${query} signal=${signal} />`}
+      ${isOpen && html`<${ResultView} result=${result} signal=${signal} jobs=${jobs} />`}
     </details>`;
 }
 
 function ResultPage({ address, signal }) {
   const id = address.path[1];
-  const attempt = useStore(session);
-  const loaded = useLoaded(
-    () => get(`v1/results/${encodeURIComponent(id)}`, null, signal),
-    [id],
-    attempt,
-  );
-  const jobs = useLoaded(
-    async () => (await get("v1/jobs", { result: id, limit: 20 })).jobs,
-    [id],
-    attempt,
-  );
+  const loaded = useLoaded(() => get(`v1/results/${encodeURIComponent(id)}`, null, signal), [id]);
+  const asked = useMemo(() => jobsOf(id), [id]);
+  const jobs = useLoaded(() => asked, [id]);
   const own = jobs.data?.find((job) => job.title)?.title;
   const name = own ?? (loaded.data && jobs.data ? sceneName(loaded.data.scene) : "Result");
   const [chosen, setChosen] = useState(null); // a study, before it starts
@@ -127,7 +119,7 @@ function ResultPage({ address, signal }) {
     ${chosen && html`<${StudyStart} scene=${loaded.data.scene} chosen=${chosen} onClose=${() => setChosen(null)} />`}
     ${jobs.error && html`<${Failure} error=${jobs.error} />`}
     <${Loaded} loaded=${loaded}>
-      ${(result) => html`<${result.study ? StudyView : ResultView} result=${result} query=${address.query} signal=${signal} />`}
+      ${(result) => html`<${result.study ? StudyView : ResultView} result=${result} signal=${signal} jobs=${asked} />`}
     <//>
   </div>`;
 }

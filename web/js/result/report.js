@@ -9,7 +9,7 @@ import { Table } from "../ui/table.js";
 import { inputsOf } from "../scene/inputs.js";
 import { KINDS } from "../study/kinds.js";
 import { brief, moment, pretty, quantity } from "../units.js";
-import { ResultContext, useResultContext } from "./context.js";
+import { ResultContext, jobsOf, useResultContext } from "./context.js";
 import { Energy } from "./energy.js";
 import { ResultHeadlines } from "./headlines.js";
 import { ImpactTable } from "./impacts.js";
@@ -18,14 +18,21 @@ import { Motion } from "./motion.js";
 import { Spectrum } from "./spectrum.js";
 
 const load = async (id, signal) => {
-  const [result, { jobs }, version, schema] = await Promise.all([
+  const [result, jobs, version, schema] = await Promise.all([
     get(`v1/results/${encodeURIComponent(id)}`, null, signal),
-    get("v1/jobs", { result: id, limit: 20 }, signal),
+    jobsOf(id, signal),
     get("version", null, signal),
     schemaNamed("scene"),
   ]);
   const View = result.study && (await KINDS[result.study.kind].load());
-  return { result, job: jobs.find((one) => one.title) ?? jobs[0], version, schema, View };
+  return {
+    result,
+    job: jobs.find((one) => one.title) ?? jobs[0],
+    jobs: Promise.resolve(jobs),
+    version,
+    schema,
+    View,
+  };
 };
 
 const inputColumns = [
@@ -51,8 +58,8 @@ const Run = ({ links }) =>
     ${links.impacts && html`<${Part} title="Impacts"><${ImpactTable} /><//>`}
     ${links.energy && html`<${Part} title="Energy"><${Energy} /><//>`}`;
 
-function Report({ result, job, version, schema, View, signal }) {
-  const context = useResultContext(result, signal);
+function Report({ result, job, jobs, version, schema, View, signal }) {
+  const context = useResultContext(result, signal, jobs);
   const { study } = result;
   const { study: asked, ...scene } = result.scene;
   const { warnings, links } = result;

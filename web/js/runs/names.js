@@ -1,6 +1,6 @@
 // Names that tell runs apart: their own titles, else what differs in their scenes.
-import { words } from "../units.js";
-import { capital, materialOf, valueText } from "./scene_name.js";
+import { capital, words } from "../units.js";
+import { materialOf, valueText } from "./scene_name.js";
 import { labelOf, varyingInputs } from "./scenes.js";
 
 const MOST_PARTS = 3; // of a name

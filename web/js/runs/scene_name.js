@@ -1,11 +1,9 @@
 // What a scene is in a few words, and values of its inputs.
-import { quantity, words } from "../units.js";
-
-export const capital = (text) => text.replace(/^./, (letter) => letter.toUpperCase());
+import { capital, quantity, words } from "../units.js";
 
 // "sponge" of "sponge@1", "zero force" of "zero_force", "15 mm".
-export function valueText(value, unit) {
-  if (typeof value === "number") return quantity(value, unit);
+export function valueText(value, unit, digits) {
+  if (typeof value === "number") return quantity(value, unit, digits);
   if (value === undefined || value === null) return "–";
   return words(String(value).replace(/@\d+$/, "")).slice(0, 60);
 }

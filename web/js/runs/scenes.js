@@ -1,5 +1,5 @@
 // What differs between scenes: the inputs that vary, with short labels, units and a value for each scene.
-import { unitAt } from "../scene/inputs.js";
+import { isObject, unitAt } from "../scene/inputs.js";
 import { words } from "../units.js";
 
 const LEFT_OUT = /^\/(output|study|title|labels)\b/;
@@ -13,7 +13,6 @@ const SECTIONS = [
   "sample_rate",
 ];
 const FIRST = ["material", "clearance", "kind", "model", "mass"]; // of a section
-const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
 
 // Map of pointer to value: numbers, words, lists as text.
 function flatten(scene) {

@@ -1,4 +1,4 @@
-// What stands at a damper's stops: a material, or numbers of one's own, and what that comes to here.
+// What stands at a damper's stops: a material, or numbers of one's own, and the stiffness and damping that follow here.
 import { get } from "../api.js";
 import { useDraft, useNews } from "../form/draft.js";
 import { ChoiceField } from "../form/fields.js";

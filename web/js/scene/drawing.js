@@ -1,6 +1,6 @@
 // A scene as a picture in a state of motion: one mass on its spring and dashpot, or storeys on columns, each with its free
 // masses between their stops.
-import { html, useLayoutEffect, useState } from "../ui/preact.js";
+import { html } from "../ui/preact.js";
 import { quantity } from "../units.js";
 import { layoutOf, roundDown } from "./layout.js";
 import { limit } from "./model.js";
@@ -264,17 +264,4 @@ export function Picture({ model, layout, state = {}, peak = 0, trail, svgRef }) 
     ${!isSingle && slabs.map((slab) => html`<${StoreyLabels} slab=${slab} model=${model} layout=${layout} />`)}
     <${Foot} model=${model} layout=${layout} />
   </svg>`;
-}
-
-// The pixels that an element has for a drawing.
-export function useRoom(ref, least = 250, most = 720) {
-  const [width, setWidth] = useState(0);
-  useLayoutEffect(() => {
-    const measure = () => setWidth(Math.round(limit(ref.current?.clientWidth ?? 0, least, most)));
-    measure();
-    const observer = new ResizeObserver(measure);
-    observer.observe(ref.current);
-    return () => observer.disconnect();
-  }, []);
-  return width;
 }

@@ -1,7 +1,8 @@
 // The drawing of a scene that is edited, with its handles, as wide as there is room.
 import { html, useRef, useState } from "../ui/preact.js";
 import { useNews } from "../form/draft.js";
-import { Picture, useRoom } from "./drawing.js";
+import { useWidth } from "../ui/width.js";
+import { Picture } from "./drawing.js";
 import { Handles } from "./handles.js";
 import { layoutOf } from "./layout.js";
 import { modelOf, MOST_DAMPERS, MOST_STOREYS } from "./model.js";
@@ -10,7 +11,7 @@ import { modelOf, MOST_DAMPERS, MOST_STOREYS } from "./model.js";
 export function SceneDrawing({ draft, history }) {
   useNews(draft);
   const box = useRef(null);
-  const width = useRoom(box);
+  const width = useWidth(box, 250, 720);
   const [fixed, setFixed] = useState(null);
   const model = modelOf(draft.scene, draft.check?.plan);
   const layout = width > 0 && layoutOf(model, { width, fixed });

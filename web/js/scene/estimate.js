@@ -1,4 +1,4 @@
-// What a scene comes to, from a dry run: modes, cost, warnings. And faults by their places.
+// The estimate of a scene, from a dry run: modes, cost, warnings. And faults by their places.
 import { link } from "../address.js";
 import { place } from "../form/place.js";
 import { Failure, faultText } from "../ui/controls.js";

@@ -2,7 +2,8 @@
 import { place } from "../form/place.js";
 import { title } from "../units.js";
 
-const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
+export const isObject = (value) =>
+  typeof value === "object" && value !== null && !Array.isArray(value);
 const LONGEST = 12; // values of a list that are written out
 
 // The schemas that could describe a value: those of alternatives too.

@@ -5,6 +5,7 @@ import { IconButton } from "../ui/controls.js";
 import { useNews } from "../form/draft.js";
 import { number, quantity } from "../units.js";
 import { limit } from "./model.js";
+import { isObject } from "./inputs.js";
 import { bareScene, makePreview, previewScene, samplesOf } from "./preview.js";
 
 const SPAN = 5; // a slider goes from a fifth of the value to five times it
@@ -13,8 +14,6 @@ const MOST_BUCKET = 0.03; // cycles of the first mode
 const POINTS = [1200, 3000]; // of a preview: as few as show the free mass between its stops
 const MOST_COST = 0.05; // s of processor time that a preview may take
 const TOO_LONG = "This run is too long for a preview; Run shows it.";
-
-const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
 
 // The sliders of a scene: {label, pointer, unit, most}.
 function slidersOf({ dampers, excitation }) {

@@ -2,7 +2,8 @@
 import { useNews } from "../form/draft.js";
 import { ChoiceField } from "../form/fields.js";
 import { Form } from "../form/form.js";
-import { place, unitOf } from "../form/place.js";
+import { place } from "../form/place.js";
+import { unitAt } from "./inputs.js";
 import { Help } from "../ui/controls.js";
 import { html, useEffect, useMemo } from "../ui/preact.js";
 import { title } from "../units.js";
@@ -25,10 +26,10 @@ const SHOWN =
 const MOST_VARIABLES = 200;
 
 // What a sweep may vary: the scene's own numbers, its buffers, the seed.
-function variables(scene, text) {
+function variables(scene, schema) {
   const found = [];
   const nameOf = (pointer) => {
-    const unit = unitOf(pointer, text);
+    const unit = unitAt(schema, pointer);
     return place(pointer) + (unit ? ` [${unit}]` : "");
   };
   const walk = (value, pointer) => {
@@ -55,7 +56,7 @@ function axis(draft, pointer) {
 }
 
 // What varies, by its name; with values to begin with.
-const axisField = (text) =>
+const axisField = (schema) =>
   Object.assign(function AxisField(context) {
     const { draft, pointer } = context;
     useNews(draft, (news) => news.pointer !== undefined && !news.isMoving);
@@ -68,7 +69,7 @@ const axisField = (text) =>
       isWide
       value=${draft.get(pointer)}
       onChoose=${choose}
-      choices=${variables(draft.scene, text)}
+      choices=${variables(draft.scene, schema)}
     />`;
   });
 
@@ -109,7 +110,7 @@ export function SceneForm({ schema, draft, widgets }) {
       start: (pointer, kind) => starts(draft)[kind ? `${pointer} ${kind}` : pointer],
       shows: (pointer) =>
         SHOWN.test(pointer) || (pointer.endsWith("/storey") && storeysOf(draft.scene) > 1),
-      widgets: [...widgets, [/^\/study\/axes\/\d+\/pointer$/, axisField(JSON.stringify(schema))]],
+      widgets: [...widgets, [/^\/study\/axes\/\d+\/pointer$/, axisField(schema)]],
     }),
     [schema, draft],
   );

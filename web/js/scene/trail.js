@@ -1,4 +1,4 @@
-// Where the structure and its free masses have been of late: lines that rise from the top of the drawing and fade, as a
+// Where the structure and its free masses were a moment ago: lines that rise from the top of the drawing and fade, as a
 // recorder's paper would show them.
 import { html } from "../ui/preact.js";
 import { px } from "./parts.js";

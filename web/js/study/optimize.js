@@ -1,5 +1,6 @@
 // The best values: the search as it went, what they gain, how far they may vary, what comes close; for two objectives the
 // front of compromises.
+import { valueText } from "../runs/scene_name.js";
 import { html, useMemo } from "../ui/preact.js";
 import { get, schema as schemaNamed } from "../api.js";
 import { Chart } from "../chart/chart.js";
@@ -10,7 +11,7 @@ import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
-import { Decision, SceneLink, between, memberName, sentence, valueText } from "./parts.js";
+import { Decision, SceneLink, between, memberName, sentence } from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 

@@ -11,13 +11,6 @@ export const plainScene = ({ study, ...scene }) => scene;
 export const memberName = (pointer) =>
   words(pointer.replace(/^\/(dampers\/0\/)?/, "").replaceAll("/", " "));
 
-// A value of a member as people read it: a number with its unit, a name without its revision.
-export function valueText(value, unit, digits = 4) {
-  if (typeof value === "number") return quantity(value, unit, digits);
-  if (typeof value === "string") return words(value.split("@")[0]);
-  return value === null || value === undefined ? "–" : JSON.stringify(value).slice(0, 80);
-}
-
 // A clause of the service as a sentence.
 export const sentence = (clause) =>
   `${clause.replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase())}.`;

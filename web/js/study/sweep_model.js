@@ -1,7 +1,8 @@
 // The table of a sweep as its page thinks of it: axes, metrics, points by their indices, which metric tells most, the best
 // point.
+import { valueText } from "../runs/scene_name.js";
 import { title } from "../units.js";
-import { extentOfValues, memberName, valueText } from "./parts.js";
+import { extentOfValues, memberName } from "./parts.js";
 
 // Metrics of the structure's response, of which less is better, the first question of a sweep.
 const RESPONSES = /^(rms|peak)_(displacement|acceleration|storey_drift|base_shear)$/;

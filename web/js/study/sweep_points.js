@@ -1,9 +1,10 @@
 // The points of a sweep one by one: the chosen one with its numbers and ways on, and all as a table.
+import { valueText } from "../runs/scene_name.js";
 import { html, useMemo } from "../ui/preact.js";
 import { submit } from "../api.js";
 import { Table } from "../ui/table.js";
 import { quantity, title } from "../units.js";
-import { JobButton, SceneLink, valueText } from "./parts.js";
+import { JobButton, SceneLink } from "./parts.js";
 import { positionsOf, rowAt } from "./sweep_model.js";
 
 const MOST_ROWS = 1000; // of the table

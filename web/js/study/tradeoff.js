@@ -5,7 +5,7 @@ import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
 import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
-import { number, quantity, words } from "../units.js";
+import { capital, number, quantity, words } from "../units.js";
 import { Decision, SceneLink, plainScene } from "./parts.js";
 
 // The scene run this way.
@@ -110,7 +110,7 @@ export function TradeoffStudy() {
   ];
   const why = recommendation.why.replace(/\d[\d.]*e-?\d+/g, (text) => number(Number(text)));
   return html`<${Decision}
-      more=${[`${why.replace(/^./, (letter) => letter.toUpperCase())}.`, `Errors are relative to ${study.reference.solver}, whose own is ${number(study.reference.error_estimate, 2)}.`]}
+      more=${[`${capital(why)}.`, `Errors are relative to ${study.reference.solver}, whose own is ${number(study.reference.error_estimate, 2)}.`]}
       actions=${taken && html`<${SceneLink} className="button primary" label="Use it in the scene" load=${() => applied(scene, taken)} keys=${[result.id]} />`}
     >
       ${decisionText(taken, metric, unit, recommendation)}

@@ -22,7 +22,7 @@ function Welcome() {
   </section>`;
 }
 
-// Shows it in `host` while the first page is the scene; whoever leaves that page knows the way.
+// Shows it in `host` while the first page is the scene; a reader who leaves that page knows the way.
 export function welcome(host, isScene) {
   if (isKnown()) return;
   if (isScene) render(html`<${Welcome} />`, host);
