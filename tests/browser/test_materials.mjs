@@ -176,14 +176,18 @@ test("A revision is reviewed, compared and reverted; who writes second is told w
 
 test("Materials are found by filters that stand in the URL", async ({ page, url, newPage }) => {
   await page.goto(url("#/materials"));
-  await page.getByLabel("Words").fill("rubber");
-  await page.getByRole("textbox", { name: "Restitution e" }).fill("0.5..");
+  await page.getByRole("searchbox", { name: "Search" }).fill("rubber");
+  await page.getByLabel("Kind").selectOption("rubber");
+  await page.getByLabel("Restitution e, at least").fill("0,5");
+  await page.getByLabel("Contact time [ms], at most").fill("19");
   await page.keyboard.press("Enter");
   await says(page.getByRole("main").getByRole("status"), /^1 found$/);
   const other = await newPage();
   await other.goto(page.url());
   await says(other.getByRole("main").getByRole("status"), /^1 found$/);
   await says(other.getByRole("region", { name: "Materials" }), /Hard rubber/);
+  assert.match(page.url(), /e=0\.5\.\.&T_c=\.\.0\.019/);
+  assert.equal(await other.getByLabel("Contact time [ms], at most").inputValue(), "19");
 });
 
 test("A table of materials has its faults told by row and column, and comes in when they are mended", async ({ page, url, folder, refused }) => {

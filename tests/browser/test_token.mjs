@@ -15,6 +15,9 @@ test("A service with tokens asks for one, refuses a wrong one, works with a righ
   refused(401);
   await page.goto(url(`#/results/${ran.result}`));
   const dialog = page.getByRole("dialog");
+  await dialog.getByLabel("Token").fill("wröng €");
+  await page.keyboard.press("Enter");
+  assert.equal(await dialog.getByLabel("Token").evaluate((input) => input.validity.patternMismatch), true);
   await dialog.getByLabel("Token").fill("wrong");
   await page.keyboard.press("Enter");
   await says(page.getByRole("alert").first(), /token/i);

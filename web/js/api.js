@@ -10,6 +10,15 @@ class Refusal extends Error {
   }
 }
 
+const AWAY = {
+  title: "The server does not answer",
+  detail: "Is it running? Nothing is lost here.",
+};
+
+// The reason of a failure: a module that could not be fetched means that nobody answered.
+export const reason = (error) =>
+  error instanceof TypeError && /module/i.test(error.message) ? new Refusal(0, AWAY) : error;
+
 const KEY = "impactd.token";
 let signIn = null; // () -> a promise of whether there is a token now
 export const token = () => sessionStorage.getItem(KEY);
@@ -41,10 +50,7 @@ async function send(method, path, { json, body, type, headers, query, signal }) 
     });
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Refusal(0, {
-      title: "The server does not answer",
-      detail: "Is it running? Nothing is lost here.",
-    });
+    throw new Refusal(0, AWAY);
   }
 }
 

@@ -103,7 +103,8 @@ async function open(address, signal, isNext) {
     if (main.querySelector(".page h1") === null)
       main.replaceChildren(element("h1", null, "This page could not be shown"));
     const box = main.appendChild(element("div", null, ""));
-    render(html`<${Failure} error=${error} />`, box);
+    const retry = () => get("version").then(() => location.reload());
+    render(html`<${Failure} error=${error} onRetry=${retry} />`, box);
     return null;
   }
 }

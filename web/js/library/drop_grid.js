@@ -127,9 +127,12 @@ export function DropGrid({ pointer, schema, draft }) {
     const result = evaluated.find(({ from }) => from === `drop ${at + 1}`);
     return html`<tr key=${row}>
       <th scope="row">${row + 1}</th>
-      ${columns.map(({ name, label }, column) => {
+      ${columns.map(({ name, label, unit }, column) => {
         const place = `${pointer}/${at}/${name}`;
-        return html`<td data-pointer=${place}>
+        return html`<td
+          data-pointer=${place}
+          data-label=${unit ? `${label} [${pretty(unit)}]` : label}
+        >
           <input
             aria-label=${`${label}, drop ${row + 1}`}
             aria-describedby=${`${id.current}-${row}`}
@@ -143,29 +146,31 @@ export function DropGrid({ pointer, schema, draft }) {
           />
         </td>`;
       })}
-      <td class="number">
+      <td class="number" data-label="e">
         <output id=${`${id.current}-${row}`}>${result && number(result.restitution, 3)}</output>
       </td>
     </tr>`;
   };
-  return html`<div class="scroll">
-      <table class="drops" aria-label="Drops">
-        <thead>
-          <tr>
-            <th scope="col">#</th>
-            ${columns.map(
-              ({ label, unit }) =>
-                html`<th scope="col">
-                  ${label}${unit && html` <span class="unit">[${pretty(unit)}]</span>`}
-                </th>`,
-            )}
-            <th scope="col" class="number">e</th>
-          </tr>
-        </thead>
-        <tbody ref=${body}>
-          ${rows.map(drawRow)}
-        </tbody>
-      </table>
+  return html`<div class="table">
+      <div class="scroll">
+        <table class="drops" aria-label="Drops">
+          <thead>
+            <tr>
+              <th scope="col">#</th>
+              ${columns.map(
+                ({ label, unit }) =>
+                  html`<th scope="col">
+                    ${label}${unit && html` <span class="unit">[${pretty(unit)}]</span>`}
+                  </th>`,
+              )}
+              <th scope="col" class="number">e</th>
+            </tr>
+          </thead>
+          <tbody ref=${body}>
+            ${rows.map(drawRow)}
+          </tbody>
+        </table>
+      </div>
     </div>
     <p class="hint">
       Enter goes down, Tab right; columns can be pasted, also with a heading that states the unit.

@@ -4,7 +4,7 @@ import { go, link } from "../address.js";
 import { ask, post, schema as schemaNamed } from "../api.js";
 import { makeDraft } from "../form/draft.js";
 import { focusField } from "../form/form.js";
-import { Loaded, Notice, Panel } from "../ui/controls.js";
+import { Loaded, Notice, Panel, withSubscripts } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
@@ -106,7 +106,9 @@ function Entry({ material, schema, signal }) {
           ${
             answer
               ? html`<${Readings} evaluation=${answer.evaluation} warnings=${answer.warnings} />`
-              : html`<p>Heights or speeds give e, durations or force traces T_c.</p>`
+              : html`<p>
+                  ${withSubscripts("Heights or speeds give e, durations or force traces T_c.")}
+                </p>`
           }
         </div>
         ${error && html`<${Refusal} error=${error} onGo=${(pointer) => focusField(fields.current, pointer)} />`}

@@ -11,29 +11,61 @@ import { figureColumns, range, statusColumn } from "./format.js";
 import { NamedForm } from "./schema_form.js";
 
 const LIMIT = 1000;
+const MS = 1000; // in a second
 const MAX_NAMES = 25; // written into the chart
-const FILTERS = [
-  { name: "q", label: "Words", example: "" },
-  { name: "kind", label: "Kind", example: "rubber" },
-  { name: "e", label: "Restitution e", example: "0.4..0.7" },
-  { name: "T_c", label: "Contact time [s]", example: "..0.02" },
-  { name: "status", label: "Status", example: "draft" },
-];
 const COLORS = { approved: "ok", draft: "c2", deprecated: "bad" };
 
-function Search({ query }) {
+// One of some values, or any.
+const Select = ({ name, label, values, value = "" }) =>
+  html`<label class="filter"
+    >${label}
+    <select name=${name}>
+      <option value="">any</option>
+      ${[...new Set([...values, value])]
+        .filter(Boolean)
+        .map((one) => html`<option selected=${one === value}>${one}</option>`)}
+    </select></label
+  >`;
+
+const scaled = (text, factor) => {
+  const value = Number(text.replace(",", ".")) * factor;
+  return text === "" || Number.isNaN(value) ? text : String(Number(value.toPrecision(12)));
+};
+const boundsOf = (texts, factor = 1) =>
+  texts.some(Boolean) ? texts.map((text) => scaled(text.trim(), factor)).join("..") : "";
+
+// Two bounds, either of them empty; the address has "0.4..0.7" in units of the service, of which `per` shown ones are one.
+function Bounds({ name, label, value = "", per = 1 }) {
+  const [low, high = low] = value.split("..");
+  const input = (text, part) =>
+    html`<input
+      name=${name}
+      inputmode="decimal"
+      aria-label=${`${label}, ${part}`}
+      defaultValue=${scaled(text, per)}
+    />`;
+  return html`<div class="filter">
+    <span class="label">${label}</span>
+    <span class="bounds">${input(low, "at least")} to ${input(high, "at most")}</span>
+  </div>`;
+}
+
+function Search({ query, kinds }) {
   const submit = (event) => {
     event.preventDefault();
-    go("materials", Object.fromEntries(new FormData(event.currentTarget)));
+    const form = new FormData(event.currentTarget);
+    const e = boundsOf(form.getAll("e"));
+    const time = boundsOf(form.getAll("T_c"), 1 / MS);
+    go("materials", { ...Object.fromEntries(form), e, T_c: time });
   };
   return html`<form class="row level" role="search" onSubmit=${submit}>
-    ${FILTERS.map(
-      ({ name, label, example }) =>
-        html`<label class="filter"
-          >${label}
-          <input name=${name} placeholder=${example} size="12" defaultValue=${query[name] ?? ""}
-        /></label>`,
-    )}
+    <label class="filter"
+      >Search <input type="search" name="q" size="14" defaultValue=${query.q ?? ""}
+    /></label>
+    <${Select} name="kind" label="Kind" values=${kinds} value=${query.kind} />
+    <${Bounds} name="e" label="Restitution e" value=${query.e} />
+    <${Bounds} name="T_c" label="Contact time [ms]" value=${query.T_c} per=${MS} />
+    <${Select} name="status" label="Status" values=${Object.keys(COLORS)} value=${query.status} />
     <button>Search</button>
   </form>`;
 }
@@ -52,13 +84,13 @@ function Overview({ materials }) {
     label: status,
     color: COLORS[status],
     size: 10,
-    x: of(status).map((row) => 1000 * row.contact_time),
+    x: of(status).map((row) => MS * row.contact_time),
     y: of(status).map((row) => row.restitution),
   }));
   const open = (shown, index) => go(`materials/${of(shown.label)[index].slug}`);
   const names = ({ x, y, right }) =>
     rows.map((row) => {
-      const at = x.to(1000 * row.contact_time);
+      const at = x.to(MS * row.contact_time);
       const isLate = at > right - 90;
       return html`<text
         x=${isLate ? at - 9 : at + 9}
@@ -108,7 +140,7 @@ function Found({ materials }) {
       columns=${columnsOf(materials)}
       rows=${materials}
       keyOf=${(row) => row.slug}
-      empty="No material is like that."
+      empty="No material matches. Widen the search, or add a material below."
     />`;
 }
 
@@ -152,6 +184,14 @@ function MaterialsPage({ address: { query } }) {
     [JSON.stringify(query)],
     imports,
   );
+  const kinds = useLoaded(
+    async (signal) => {
+      const { materials } = await get("v1/materials", { limit: LIMIT }, signal);
+      return [...new Set(materials.map(({ kind }) => kind))].sort();
+    },
+    [],
+    imports,
+  );
   const files = ["materials.csv", "materials.json"];
   return html`<div class="title-row">
       <h1>Materials</h1>
@@ -159,7 +199,7 @@ function MaterialsPage({ address: { query } }) {
     </div>
     <p class="lead">What a laboratory measured of its buffers.</p>
     <section class="panel" aria-label="Search">
-      <${Search} key=${JSON.stringify(query)} query=${query} />
+      <${Search} key=${JSON.stringify(query)} query=${query} kinds=${kinds.data ?? []} />
       <${Loaded} loaded=${loaded}>${(data) => html`<${Found} ...${data} />`}<//>
     </section>
     <${Panel} title="Add and exchange">

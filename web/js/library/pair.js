@@ -171,7 +171,7 @@ export function PairPanel({ material }) {
         isWrong=${!isValid && masses.damper_mass !== null}
         onInput=${setOther}
       />
-      <div class="field">
+      <div class="field wide">
         <span class="label" aria-hidden="true">Carried over from the test</span>
         <${Choice}
           label="Carried over from the test"

@@ -1,7 +1,7 @@
 // What a reader takes along: files in every format, and lines that run this scene elsewhere.
 import { html } from "../ui/preact.js";
 import { address, save } from "../api.js";
-import { CopyButton } from "../ui/controls.js";
+import { CodeBlock } from "../ui/controls.js";
 import { title } from "../units.js";
 import { useResult } from "./context.js";
 
@@ -44,8 +44,7 @@ export function Files() {
       ([name, lines]) =>
         html`<details>
           <summary>Run this scene from ${name}</summary>
-          <${CopyButton} text=${lines} />
-          <pre tabindex="0">${lines}</pre>
+          <${CodeBlock} text=${lines} />
         </details>`,
     )}`;
 }

@@ -6,9 +6,10 @@ import { Button, Loaded } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
 import { Table } from "../ui/table.js";
-import { inputsOf } from "../scene/inputs.js";
+import { place } from "../form/place.js";
+import { inputsOf, unitAt } from "../scene/inputs.js";
 import { KINDS } from "../study/kinds.js";
-import { brief, moment, pretty, quantity } from "../units.js";
+import { brief, moment, pretty, quantity, title } from "../units.js";
 import { ResultContext, jobsOf, useResultContext } from "./context.js";
 import { Energy } from "./energy.js";
 import { ResultHeadlines } from "./headlines.js";
@@ -45,6 +46,23 @@ const inputColumns = [
   },
 ];
 
+const VARIED = /^(from|to|values|mean|deviation|median|mode)$/;
+
+// A study's own inputs: a place of the scene that it varies stands in words, its values have the unit of that place.
+function studyInputs(study, schema) {
+  const memberAt = (names) => names.reduce((value, name) => value[name], study);
+  return inputsOf({ study }, schema).map((row) => {
+    const names = row.pointer.split("/").slice(2);
+    const name = names.pop();
+    const { pointer, pointers } = memberAt(names);
+    const label = title(place(row.pointer.replace("/study", "")).replace(/pointers?$/, "member"));
+    if (/^pointers?$/.test(name))
+      return { label, text: title([row.value].flat().map(place).join("; ")) };
+    const unit = VARIED.test(name) ? unitAt(schema, pointer ?? pointers?.[0] ?? "") : row.unit;
+    return { ...row, label, unit };
+  });
+}
+
 const Part = ({ title, children }) =>
   html`<section>
     <h2>${title}</h2>
@@ -79,6 +97,15 @@ function Report({ result, job, jobs, version, schema, View, signal }) {
           ${remarks}
         </ul><//
       >`
+    }
+    ${
+      asked &&
+      html`<${Part} title="Inputs of the study"
+        ><${Table}
+          caption="Inputs of the study"
+          columns=${inputColumns}
+          rows=${studyInputs(asked, schema)}
+      /><//>`
     }
     <${Part} title="Inputs">
       <${Table} caption="Inputs" columns=${inputColumns} rows=${inputsOf(scene, schema)} />

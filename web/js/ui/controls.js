@@ -1,6 +1,7 @@
 // Small parts of pages: buttons, notices, panels, tabs, menus, headline numbers.
 import { hints, places } from "../help.js";
 import { html, useLayoutEffect, useRef, useState } from "./preact.js";
+import { reason } from "../api.js";
 import { announce } from "./announce.js";
 import { freshId } from "./ids.js";
 
@@ -64,6 +65,13 @@ export function CopyButton({ text, label = "Copy" }) {
   return html`<button type="button" class="quiet" onClick=${copy}>${state ?? label}</button>`;
 }
 
+// Lines to copy, with the button that copies them.
+export const CodeBlock = ({ text }) =>
+  html`<div class="code-box">
+    <pre tabindex="0">${text}</pre>
+    <${CopyButton} text=${text} />
+  </div>`;
+
 // A box with a heading: kind is "info", "ok", "warn" or "bad"; "bad" is announced at once.
 export const Notice = ({ kind = "info", title, children }) =>
   html`<div class=${`notice ${kind}`} role=${kind === "bad" ? "alert" : null}>
@@ -75,8 +83,9 @@ export const faultText = ({ detail, did_you_mean: meant }) =>
   `${detail}${meant ? ` (did you mean "${meant}"?)` : ""}`;
 
 // What went wrong, with every fault and its place, as the service said it.
-export const Failure = ({ error: { title, errors, message, detail } }) =>
-  html`<${Notice} kind="bad" title=${title ?? "That did not work"}>
+export const Failure = ({ error, onRetry }) => {
+  const { title, errors, message, detail, status } = reason(error);
+  return html`<${Notice} kind="bad" title=${title ?? "That did not work"}>
     ${
       errors?.length > 0
         ? html`<ul>
@@ -84,11 +93,13 @@ export const Failure = ({ error: { title, errors, message, detail } }) =>
           </ul>`
         : html`<p>${message ?? detail}</p>`
     }
+    ${status === 0 && onRetry && html`<p><${Button} onClick=${onRetry}>Try again<//></p>`}
   <//>`;
+};
 
 // What waits for `loaded` ({data, error, isLoading} of useLoaded) before it shows anything.
 export function Loaded({ loaded, children }) {
-  if (loaded.error) return html`<${Failure} error=${loaded.error} />`;
+  if (loaded.error) return html`<${Failure} error=${loaded.error} onRetry=${loaded.retry} />`;
   if (loaded.data === null) return html`<p class="quiet">Loading …</p>`;
   return children(loaded.data);
 }

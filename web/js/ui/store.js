@@ -41,13 +41,15 @@ export function useStore(store, select = (value) => value) {
   return selected;
 }
 
-// What a promise brings: {data, error, isLoading}. `load(signal)` runs when `keys` change; the earlier one is aborted, its
+// What a promise brings: {data, error, isLoading, retry()}. `load(signal)` runs when `keys` change; the earlier one is aborted, its
 // data stay until the new ones are here.
 export function useLoaded(load, keys, again = 0) {
+  const [turn, retry] = useReducer((count) => count + 1, 0);
   const [state, setState] = useReducer((_, next) => next, {
     data: null,
     error: null,
     isLoading: true,
+    retry,
   });
   const held = useRef(state);
   const set = (next) => {
@@ -60,10 +62,10 @@ export function useLoaded(load, keys, again = 0) {
     Promise.resolve()
       .then(() => load(stop.signal))
       .then(
-        (data) => !stop.signal.aborted && set({ data, error: null, isLoading: false }),
-        (error) => !stop.signal.aborted && set({ data: null, error, isLoading: false }),
+        (data) => !stop.signal.aborted && set({ data, error: null, isLoading: false, retry }),
+        (error) => !stop.signal.aborted && set({ data: null, error, isLoading: false, retry }),
       );
     return () => stop.abort();
-  }, [...keys, again]);
+  }, [...keys, again, turn]);
   return state;
 }

@@ -92,6 +92,14 @@ export function Table({
   }
   const headOf = (column, at) =>
     `${column.label}${formats[at]?.unit ? ` [${formats[at].unit}]` : ""}`;
+  // What stands before a value on a phone: a symbol after the word adds nothing there.
+  const shortHeadOf = (column, at) => headOf(column, at).replace(/ [A-Za-z]_[a-z]\b/, "");
+  const isLong = (column, at) =>
+    !formats[at] && rows.some((row) => textOf(column, row, at).length > 18);
+  const kinds = columns.map((column, at) => {
+    if (formats[at]) return "number";
+    return isLong(column, at) ? "long" : null;
+  });
   const lines = () =>
     [
       columns.map((column) => `${column.label}${column.unit ? ` [${column.unit}]` : ""}`),
@@ -121,11 +129,7 @@ export function Table({
             ${selection && html`<th scope="col"><span class="visually-hidden">Choose</span></th>`}
             ${columns.map(
               (column, at) =>
-                html`<th
-                  scope="col"
-                  class=${formats[at] ? "number" : null}
-                  aria-sort=${ariaSort(at)}
-                >
+                html`<th scope="col" class=${kinds[at]} aria-sort=${ariaSort(at)}>
                   <button type="button" class="sort" onClick=${() => sort(at)}>
                     ${withSubscripts(headOf(column, at))}
                   </button>
@@ -154,12 +158,13 @@ export function Table({
                 }
                 ${columns.map((column, at) => {
                   const content = column.cell?.(row) ?? textOf(column, row, at);
-                  const kind = formats[at] ? "number" : null;
                   return at === 0
-                    ? html`<th scope="row" class=${kind} data-label=${headOf(column, at)}>
+                    ? html`<th scope="row" class=${kinds[at]} data-label=${shortHeadOf(column, at)}>
                         ${content}
                       </th>`
-                    : html`<td class=${kind} data-label=${headOf(column, at)}>${content}</td>`;
+                    : html`<td class=${kinds[at]} data-label=${shortHeadOf(column, at)}>
+                        ${content}
+                      </td>`;
                 })}
               </tr>`,
           )}

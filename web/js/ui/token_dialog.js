@@ -16,7 +16,16 @@ function TokenDialog({ onClose }) {
     <form method="dialog">
       <h2>A token is asked for</h2>
       <p>The administrator of this server creates one with <code>impactd token create</code>.</p>
-      <label>Token <input type="password" autocomplete="off" required ref=${input} /></label>
+      <label
+        >Token
+        <input
+          type="password"
+          autocomplete="off"
+          required
+          pattern="\\s*[!-~]+\\s*"
+          title="A token has only letters, digits and signs of ASCII, without spaces"
+          ref=${input}
+      /></label>
       <div class="row">
         <button class="primary" value="use">Use it</button>
         <button value="" formnovalidate>Not now</button>
