@@ -27,6 +27,25 @@ const tickText = (value, factor, isLog) =>
     ? number(value / factor, 2).replace(/^1 × /, "")
     : number(Number((value / factor).toPrecision(9)), 9);
 
+const GLYPH = 6.2; // px, a letter of an axis' texts
+export const textWidth = (text) => GLYPH * text.length;
+
+// A name in one line, or in two where it is wider than `room`.
+export function linesOf(text, room) {
+  if (textWidth(text) <= room) return [text];
+  const middle = text.length / 2;
+  const spaces = [...text.matchAll(/ /g)].map(({ index }) => index);
+  const [at] = spaces.sort((a, b) => Math.abs(a - middle) - Math.abs(b - middle));
+  return at ? [text.slice(0, at), text.slice(at + 1)] : [text];
+}
+
+const Name = ({ x, y, text, room }) => {
+  const lines = linesOf(text, room);
+  return html`<text y=${y + 10 - 6 * lines.length} text-anchor="end">
+    ${lines.map((line, at) => html`<tspan x=${x} dy=${at > 0 ? 12 : 0}>${line}</tspan>`)}
+  </text>`;
+};
+
 // Round numbers in the axis' unit; a category axis has `categories`: texts at 0, 1, 2, …
 function ticksFor(axis, scale, factor, most) {
   if (!axis.categories) {
@@ -50,16 +69,17 @@ export function XAxis({ axis, scale, top, bottom, isCompact }) {
     ${ticks.map((value) => {
       const x = Math.round(scale.to(value)) + 0.5;
       const text = axis.categories ? axis.categories[value] : tickText(value, factor, axis.log);
+      const middle = Math.min(x, right + 14 - textWidth(text) / 2); // none is cut off
       return html`<g>
         <line x1=${x} x2=${x} y1=${top} y2=${bottom} class="grid" />
-        ${!isCompact && html`<text x=${x} y=${bottom + 15} text-anchor="middle">${text}</text>`}
+        ${!isCompact && html`<text x=${middle} y=${bottom + 15} text-anchor="middle">${text}</text>`}
       </g>`;
     })}
     <line x1=${left} x2=${right} y1=${bottom + 0.5} y2=${bottom + 0.5} class="frame" />
   </g>`;
 }
 
-export function YAxis({ axis, scale, left, right }) {
+export function YAxis({ axis, scale, left, right, edge }) {
   const [bottom, top] = scale.pixels;
   const { factor } = axisUnit(axis, scale.domain);
   const ticks = ticksFor(
@@ -75,8 +95,9 @@ export function YAxis({ axis, scale, left, right }) {
       const isZero = value === 0 && !axis.categories;
       return html`<g>
         <line x1=${left} x2=${right} y1=${y} y2=${y} class=${isZero ? "grid zero" : "grid"} />
-        <text x=${left - 6} y=${y + 4} text-anchor="end">${text}</text>
+        <${Name} x=${left - 6} y=${y} text=${text} room=${left - 6} />
       </g>`;
     })}
+    ${axis.ends?.map((text, at) => html`<${Name} x=${edge} y=${scale.to(at)} text=${text} room=${edge - right - 6} />`)}
   </g>`;
 }

@@ -6,12 +6,12 @@ import { announce } from "../ui/announce.js";
 import { freshId } from "../ui/ids.js";
 import { useWidth } from "../ui/width.js";
 import { quantity } from "../units.js";
-import { axisUnit, XAxis, YAxis } from "./axis.js";
+import { axisUnit, textWidth, XAxis, YAxis } from "./axis.js";
 import { Cursor, cursorOf } from "./cursor.js";
 import { ChartTools, DataTable } from "./export.js";
 import { handleKey, handlePointers } from "./input.js";
 import { Legend } from "./legend.js";
-import { Markers, Rules, Spans } from "./marks.js";
+import { Markers, Rules, Spans, uprightLabels } from "./marks.js";
 import { extentOf, linearScale, logScale, paddedDomain } from "./scale.js";
 import { drawSeries, valuesInView } from "./series.js";
 
@@ -49,7 +49,8 @@ function valueDomain(y, series, rules, domain) {
 
 // Chart({title, description, x, y, series, …}):
 //   title, description   a heading; a sentence on what is seen, for those who do not see it
-//   x, y                 {label, unit, log, domain, categories}: without `domain` what the values need
+//   x, y                 {label, unit, log, domain, categories}: without `domain` what the values need; y.ends are texts at the
+//                        right of its categories
 //   series               [{kind, label, unit, color, x, y, …}], see series.js; `x` and `y` are arrays that nobody changes
 //   spans, rules, markers  [{from, to, label}]; [{x or y, label, color}]; [{x, label, color, onPick}]
 //   heading              in place of the names of the axes
@@ -60,7 +61,7 @@ function valueDomain(y, series, rules, domain) {
 //   onPick               called with (series, index) of the point that was clicked
 //   isCompact            the numbers of x are left out: another chart stands below
 //   isShort              the heading names x too, so that no line below does
-//   isFixed              without zoom and cursor: the children listen to the pointer
+//   isFixed              without zoom and cursor: the children listen to the pointer, onKeyDown to keys
 //   underlay, children   further SVG below and above the series, from the plot {x, y, left, right, top, bottom}: scales, pixels
 export function Chart(props) {
   const { title, description, x, y, height = 200, isCompact = false, isShort = false } = props;
@@ -78,14 +79,17 @@ export function Chart(props) {
   const whole = wholeDomain(x, props.series);
   const range = usable((props.onRange ? props.range : ownRange) ?? null, x.log);
   const domain = range ?? whole;
-  const top = MARGIN.top + (markers.length > 0 ? MARGIN.marks : 0);
-  const bottom = top + height;
-  const outerHeight = bottom + (isCompact ? 6 : MARGIN.bottom);
-  const left = y.categories ? Math.min(180, width * 0.4) : MARGIN.left;
-  const right = Math.max(left + 20, width - MARGIN.right);
+  const room = (texts, part) => Math.min(part * width, 10 + Math.max(...texts.map(textWidth)));
+  const left = y.categories ? Math.max(MARGIN.left, room(y.categories, 0.4)) : MARGIN.left;
+  const ends = y.ends ? room(y.ends, 0.25) : MARGIN.right;
+  const right = Math.max(left + 20, width - ends);
   const makeX = x.log ? logScale : linearScale;
   const makeY = y.log ? logScale : linearScale;
   const xScale = makeX(domain, [left, right]);
+  const labels = uprightLabels(rules, xScale);
+  const top = MARGIN.top + labels.height + (markers.length > 0 ? MARGIN.marks : 0);
+  const bottom = top + height;
+  const outerHeight = bottom + (isCompact ? 6 : MARGIN.bottom);
   const yScale = makeY(valueDomain(y, series, rules, domain), [bottom, top]);
   const density = Math.max(1, globalThis.devicePixelRatio ?? 1);
   const cursor = cursorOf(props.group ?? id);
@@ -147,11 +151,11 @@ export function Chart(props) {
     <div
       class="plot"
       ref=${box}
-      tabindex=${isFixed ? null : 0}
-      role=${isFixed ? "img" : "application"}
+      tabindex=${isFixed && !props.onKeyDown ? null : 0}
+      role=${isFixed && !props.onKeyDown ? "img" : "application"}
       aria-label=${title}
       aria-describedby=${`${id}-summary`}
-      onKeyDown=${isFixed ? null : (event) => handleKey(event, latest.current)}
+      onKeyDown=${isFixed ? props.onKeyDown : (event) => handleKey(event, latest.current)}
     >
       <svg ref=${svg} width=${width} height=${outerHeight} aria-hidden="true">
         <defs>
@@ -161,13 +165,13 @@ export function Chart(props) {
         </defs>
         <${Spans} spans=${spans} plot=${plot} />
         ${width > 0 && underlay?.(plot)}
-        <${YAxis} axis=${y} scale=${yScale} left=${left} right=${right} />
+        <${YAxis} axis=${y} scale=${yScale} left=${left} right=${right} edge=${width - 2} />
         <${XAxis} axis=${x} scale=${xScale} top=${top} bottom=${bottom} isCompact=${isCompact} />
         <g clip-path=${`url(#${id}-clip)`}>
           ${width > 0 && series.map((one) => drawSeries(one, xScale, yScale, density))}
         </g>
+        <${Rules} rules=${rules} plot=${plot} labels=${labels} series=${series} />
         ${width > 0 && children?.(plot)}
-        <${Rules} rules=${rules} plot=${plot} isBelow=${spans.some(({ label }) => label)} />
         <${Markers} markers=${markers} plot=${plot} />
       </svg>
       ${

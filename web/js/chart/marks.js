@@ -1,5 +1,7 @@
 // What stands on a chart beside its series: shaded spans, rules, marks of events.
 import { html } from "../ui/preact.js";
+import { textWidth } from "./axis.js";
+import { nearestIndex } from "./series.js";
 
 export function Spans({ spans, plot }) {
   const { x, left, right, top, bottom } = plot;
@@ -14,41 +16,79 @@ export function Spans({ spans, plot }) {
   });
 }
 
-function Rule({ rule, plot, line }) {
+const LINE = 14; // px
+
+// Where the labels of upright rules stand above the plot, none over another: {height, places: Map of rules to {line, start}}.
+export function uprightLabels(rules, x) {
+  const upright = rules.filter((rule) => rule.x !== undefined && rule.label);
+  const [left, right] = x.pixels;
+  const ends = []; // of each line
+  const places = new Map();
+  for (const rule of upright.toSorted((a, b) => a.x - b.x)) {
+    const at = x.to(rule.x);
+    if (!(at >= left && at <= right)) continue;
+    const size = textWidth(rule.label);
+    const start = Math.max(left, Math.min(at, right - size));
+    const free = ends.findIndex((end) => end < start);
+    const line = free < 0 ? ends.length : free;
+    ends[line] = start + size + 8;
+    places.set(rule, { line, start });
+  }
+  return { height: LINE * Math.max(ends.length, Math.min(1, upright.length)), places };
+}
+
+// Whether a series is in a box of the plot, or a line of it on both sides of the box.
+function isIn(one, plot, [left, right], [low, high]) {
+  const sides = new Set();
+  for (const part of [0, 0.2, 0.4, 0.6, 0.8, 1]) {
+    const index = nearestIndex(one, plot.x.from(left + part * (right - left)));
+    const at = plot.x.to(one.x[index]);
+    if (one.kind === "points" && !(at > left - 5 && at < right + 5)) continue;
+    const [a, b] = [one.low?.[index] ?? one.y?.[index], one.high?.[index] ?? one.y?.[index]];
+    const foot = one.kind === "bars" ? plot.bottom : plot.y.to(a);
+    sides.add(Number(foot < low - 4) - Number(plot.y.to(b) > high + 4));
+  }
+  return sides.has(0) || (sides.size > 1 && one.kind !== "points");
+}
+
+// A level rule has its label where no series is: at the right, the left or in the middle, above or below.
+function levelPlace(at, label, plot, series) {
+  const { left, right, top, bottom } = plot;
+  const size = textWidth(label);
+  const starts = [right - 4 - size, left + 4, (left + right - size) / 2];
+  const places = starts.flatMap((x) => [at - 5, at + 14].map((y) => ({ x, y })));
+  const inside = places.filter(({ y }) => y - 12 > top && y < bottom);
+  const isFree = ({ x, y }) =>
+    !series.some((one) => isIn(one, plot, [x, x + size], [y - 10, y + 2]));
+  return inside.find(isFree) ?? inside[0];
+}
+
+function Rule({ rule, plot, label, series }) {
   const { x, y, left, right, top, bottom } = plot;
   const style = { "--ink": `var(--${rule.color ?? "quiet"})` };
   if (rule.x !== undefined) {
     const at = x.to(rule.x);
     if (!(at >= left && at <= right)) return null;
-    const isLate = at > (left + right) / 2;
+    const foot = 10 + LINE * (label?.line ?? 0);
     return html`<g class="rule" style=${style}>
-      <line x1=${at} x2=${at} y1=${top} y2=${bottom} />
-      <text
-        x=${isLate ? at - 5 : at + 5}
-        y=${top + 14 * (line + 1)}
-        text-anchor=${isLate ? "end" : "start"}
-        >${rule.label}</text
-      >
+      <line x1=${at} x2=${at} y1=${label ? foot + 3 : top} y2=${bottom} />
+      ${label && html`<text x=${label.start} y=${foot}>${rule.label}</text>`}
     </g>`;
   }
   const at = y.to(rule.y);
   if (!(at >= top && at <= bottom)) return null;
+  const place = rule.label && levelPlace(at, rule.label, plot, series);
   return html`<g class="rule" style=${style}>
     <line x1=${left} x2=${right} y1=${at} y2=${at} />
-    <text x=${right - 4} y=${at < top + 18 ? at + 14 : at - 5} text-anchor="end"
-      >${rule.label}</text
-    >
+    ${place && html`<text x=${place.x} y=${place.y}>${rule.label}</text>`}
   </g>`;
 }
 
-// Labels of upright rules stand in lines below each other, below those of spans where `isBelow`.
-export const Rules = ({ rules, plot, isBelow }) => {
-  const upright = rules.filter((rule) => rule.x !== undefined && rule.label);
-  return rules.map((rule) => {
-    const line = (isBelow ? 1 : 0) + (Math.max(0, upright.indexOf(rule)) % 3);
-    return html`<${Rule} rule=${rule} plot=${plot} line=${line} />`;
-  });
-};
+export const Rules = ({ rules, plot, labels, series }) =>
+  rules.map(
+    (rule) =>
+      html`<${Rule} rule=${rule} plot=${plot} label=${labels.places.get(rule)} series=${series} />`,
+  );
 
 // Ticks above the plot; a chosen one is longer.
 export function Markers({ markers, plot }) {

@@ -8,6 +8,7 @@ import { Loaded, Notice, Panel, withSubscripts } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
+import { capital } from "../units.js";
 import { DropGrid } from "./drop_grid.js";
 import { path, readMaterial } from "./format.js";
 import { Readings } from "./readings.js";
@@ -121,20 +122,27 @@ function Entry({ material, schema, signal }) {
   </div>`;
 }
 
-// The second step: the revision that a test proposes, one click from being made.
-function Proposal({ material, measurements }) {
+// The second step: the revision that a test, or a calibration, proposes, one click from being made.
+function Proposal({ material, measurements, calibration }) {
   const loaded = useLoaded(
     async (signal) => {
-      const query = { measurements };
-      const answer = await ask("GET", path(material.slug, "/proposal"), { query, signal });
+      const answer = calibration
+        ? await ask("POST", `v1/results/${encodeURIComponent(calibration)}/calibration/proposal`, {
+            query: { material: material.slug },
+            signal,
+          })
+        : await ask("GET", path(material.slug, "/proposal"), { query: { measurements }, signal });
       return { found: await answer.json(), etag: answer.headers.get("ETag") };
     },
-    [material.slug, measurements],
+    [material.slug, measurements, calibration],
   );
   return html`<${Loaded} loaded=${loaded}>
     ${({ found, etag }) =>
       html`<div class="split even">
-        <${Panel} title=${`What comes of test ${measurements}`} help="Proposal">
+        <${Panel}
+          title=${calibration ? "What comes of the calibration" : `What comes of test ${measurements}`}
+          help="Proposal"
+        >
           ${
             found.revision === null
               ? html`<${Notice} kind="warn" title="No revision"><p>${found.why}</p><//>`
@@ -149,9 +157,15 @@ function Proposal({ material, measurements }) {
           }
         <//>
         <div class="sticky">
-          <${Panel} title="Result">
-            <${Readings} evaluation=${found.evaluation} warnings=${found.warnings} />
-          <//>
+          ${
+            found.evaluation
+              ? html`<${Panel} title="Result">
+                  <${Readings} evaluation=${found.evaluation} warnings=${found.warnings} />
+                <//>`
+              : found.warnings.map(
+                  ({ detail }) => html`<p class="hint">${`${capital(detail)}.`}</p>`,
+                )
+          }
         </div>
       </div>`}
   <//>`;
@@ -159,7 +173,7 @@ function Proposal({ material, measurements }) {
 
 function DropTestPage({ address: { path: parts, query }, signal }) {
   const slug = parts[1];
-  const { measurement } = query;
+  const { measurement, calibration } = query;
   const loaded = useLoaded(
     async (own) => {
       const material = await readMaterial(slug, null, own);
@@ -169,10 +183,19 @@ function DropTestPage({ address: { path: parts, query }, signal }) {
   );
   return html`<${Loaded} loaded=${loaded}>
     ${({ material, schema }) =>
-      html`<h1>Drop test of <a href=${link(`materials/${slug}`)}>${material.name}</a></h1>
+      html`<h1>
+          ${calibration ? "Calibration of" : "Drop test of"}${" "}<a
+            href=${link(`materials/${slug}`)}
+            >${material.name}</a
+          >
+        </h1>
         ${
-          measurement
-            ? html`<${Proposal} material=${material} measurements=${measurement} />`
+          measurement || calibration
+            ? html`<${Proposal}
+                material=${material}
+                measurements=${measurement}
+                calibration=${calibration}
+              />`
             : html`<${Entry} material=${material} schema=${schema} signal=${signal} />`
         }`}
   <//>`;

@@ -80,7 +80,7 @@ function StudyView({ result, signal, jobs }) {
         <${Loaded} loaded=${loaded}>${(View) => html`<${View} />`}<//>
         <p>
           <a class="button" href=${link("scene", { result: result.id })}>Change the study</a>
-          <a class="help" href=${`guide/study-${kind}.html`} aria-label="Guide: this study">?</a>
+          ${" "}<a class="button" href=${`guide/study-${kind}.html`}>Guide to this study</a>
         </p>
       <//>
       <${Panel} title="Files and code"><${Files} /><//>

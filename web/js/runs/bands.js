@@ -14,6 +14,15 @@ function bandMeans({ x, y }) {
   return bands;
 }
 
+// A spectrum as a line through its third octaves.
+export function bandLine(spectrum) {
+  const bands = [...bandMeans(spectrum)].sort(([a], [b]) => a - b);
+  return {
+    x: bands.map(([band]) => 10 ** (band / STEPS)),
+    y: bands.map(([, { mean }]) => mean),
+  };
+}
+
 // The bands that both spectra have: [{frequency, low, high, mean, level, count}], `mean` of the first, `level` in dB of the
 // second over it.
 export function bandDifferences(first, second) {

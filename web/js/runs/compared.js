@@ -2,7 +2,7 @@
 import { get, schema as schemaNamed } from "../api.js";
 import { inputsOf } from "../scene/inputs.js";
 import { differingNames } from "./names.js";
-import { valueText } from "./scene_name.js";
+import { materialOf, valueText } from "./scene_name.js";
 import { isSame } from "./scenes.js";
 
 export const LETTERS = [..."abcd"];
@@ -52,7 +52,7 @@ export async function loadComparison(ids, signal) {
   runs.forEach((run, at) =>
     Object.assign(run, {
       color: `c${at + 1}`,
-      label: `${"ABCD"[at]} ${lower(names[at])}`.trim(),
+      label: `${"ABCD"[at]} ${lower(names[at] ?? materialOf(scenes[at]))}`.trim(),
     }),
   );
   return { runs, pairs, inputs: differingInputs(scenes, schema) };

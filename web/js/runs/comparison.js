@@ -24,7 +24,7 @@ function pushText(runs) {
   const harder = ratio(force(hard), force(soft), "N").replace("%s", `hard as ${soft.label}`);
   const isLonger = contact(soft) > 1.05 * contact(hard) && contact(hard) > 0;
   const longer = ratio(contact(soft), contact(hard), "s").replace("%s", "long over a contact");
-  return `${hard.label} pushes ${harder}${isLonger ? `, for ${soft.label} takes ${longer}` : ""}.`;
+  return `${hard.label} pushes ${harder}${isLonger ? `; ${soft.label} pushes ${longer}` : ""}.`;
 }
 
 // How much more or less one moves than the first.
@@ -133,7 +133,7 @@ function Motions({ runs, pairs, query, change }) {
       ? [
           {
             x: divergence.time,
-            label: runs.length < 4 ? `${run.label} parts` : "",
+            label: runs.length < 4 ? `${run.label} differs` : "",
             color: run.color,
           },
         ]
@@ -231,7 +231,11 @@ function Spectra({ runs, pairs }) {
     </div>`;
 }
 
-// The push of each run's first impact, on scales that show both a blow and a push.
+const ALIKE = 10; // pushes of up to this ratio share a chart
+
+const isAlike = (values) => Math.max(...values) < ALIKE * Math.min(...values);
+
+// The push of each run's first impact: a blow and a push each have a chart of their own.
 function FirstImpacts({ runs }) {
   const pushing = runs.filter(({ force }) => force && force.time.values.length > 2);
   const rows = [
@@ -257,18 +261,22 @@ function FirstImpacts({ runs }) {
       y: forces.map((force) => force * sign),
     };
   });
-  const lasts = series.map(({ x }) => x[x.length - 1]);
+  const lastOf = ({ x }) => x[x.length - 1];
+  const isOne = isAlike(series.map(lastOf)) && isAlike(series.map(({ y }) => Math.max(...y)));
+  const charts = isOne ? [series] : series.map((one) => [one]);
   return html`<div class="columns">
-    ${
-      series.length > 0 &&
-      html`<${Chart}
-        title="Push of the first impact"
-        height=${220}
-        x=${{ label: "Time since it began", unit: "s", log: true, domain: [Math.min(...lasts) / 20, Math.max(...lasts)] }}
-        y=${{ label: "Contact force", unit: "N", log: true }}
-        series=${series}
-      />`
-    }
+    ${charts.map(
+      (shown) =>
+        html`<${Chart}
+          key=${shown[0]?.label}
+          title=${`Push of the first impact${isOne ? "" : `: ${shown[0].label}`}`}
+          height=${isOne ? 220 : 150}
+          x=${{ label: "Time since it began", unit: "s" }}
+          y=${{ label: isOne ? "Contact force" : `${shown[0].label}: contact force`, unit: "N", includeZero: true }}
+          series=${shown}
+          rules=${shown.map((one) => ({ x: lastOf(one), label: `contact time ${quantity(lastOf(one), "s", 3)}`, color: one.color }))}
+        />`,
+    )}
     <${ComparisonTable} caption="First impacts" head="Quantity" runs=${runs} rows=${rows} />
   </div>`;
 }

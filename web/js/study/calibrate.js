@@ -1,6 +1,7 @@
 // Parameters fitted to a measurement: what they are and how well they are known, the measured and the fitted motion, what is
 // left between them.
 import { html, useMemo } from "../ui/preact.js";
+import { link } from "../address.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
@@ -33,12 +34,25 @@ export function CalibrateStudy() {
       `The measurement begins ${quantity(shift, "s")} later than the scene.`,
     ...study.warnings.map(({ detail: text }) => sentence(text)),
   ];
+  // Materials whose numbers were fitted: each can have them as its next revision.
+  const isOfBuffer = parameters.some((one) => /restitution|contact_time/.test(pointerOf(one)));
   const use = html`<${SceneLink}
-    className="button primary"
-    label="Run the scene with these values"
-    load=${() => get(`${path}/calibration/scene`)}
-    keys=${[result.id]}
-  />`;
+      className="button primary"
+      label="Run the scene with these values"
+      load=${() => get(`${path}/calibration/scene`)}
+      keys=${[result.id]}
+    />
+    ${
+      isOfBuffer &&
+      result.materials.map(
+        ({ slug }) =>
+          html`<a
+            class="button"
+            href=${link(`materials/${slug}/measure`, { calibration: result.id })}
+            >${`Propose a revision of ${words(slug)}`}</a
+          >`,
+      )
+    }`;
   return html`<${Decision} more=${remarks} actions=${use}>${title(study.verdict)}: ${found}.<//>
     ${motions.map((motion, at) => html`<${Motion} key=${at} motion=${motion} />`)}
     <${Intervals} parameters=${parameters} />
@@ -79,17 +93,16 @@ function Intervals({ parameters }) {
     .filter(({ value, interval_95: interval }) => value !== 0 && interval)
     .map((one) => ({
       label: title(memberName(pointerOf(one))),
-      from: one.interval_95[0] / one.value,
-      to: one.interval_95[1] / one.value,
+      from: 100 * (one.interval_95[0] / one.value - 1),
+      to: 100 * (one.interval_95[1] / one.value - 1),
       color: one.identifiable === false ? "c6" : "c1",
       text: `± ${share((one.interval_95[1] - one.interval_95[0]) / 2 / Math.abs(one.value), 2)}`,
     }));
   if (rows.length === 0) return null;
   return html`<${Bars}
     title="How well each is known"
-    x=${{ label: "95 % interval as a part of the value", unit: "1" }}
+    x=${{ label: "95 % interval about the value [%]", unit: "1" }}
     rows=${rows}
-    origin=${1}
   />`;
 }
 

@@ -4,11 +4,17 @@ import { html, useMemo } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
 import { share } from "../result/headlines.js";
+import { bandLine } from "../runs/bands.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
-import { number, quantity, title, words } from "../units.js";
+import { capital, number, quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
-import { Decision } from "./parts.js";
+import { Decision, sentence } from "./parts.js";
+
+const MOST_NAMED = 3; // in a sentence
+const PROPER = /^(hertz|hunt crossley|lankarani nikravesh|flores|jankowski)/;
+const modelName = (name) =>
+  words(name).replace(PROPER, (names) => names.split(" ").map(capital).join("-"));
 
 const signed = (value, digits = 3) => `${value > 0 ? "+" : ""}${number(value, digits)}`;
 
@@ -35,13 +41,13 @@ function decisionOf(entries, study) {
   const [own, ...others] = entries;
   const impulse = others.find((entry) => entry.contact_model === "impulse");
   if (impulse && own.contacts.mean_duration > 0)
-    return `The impulse model's spectrum is off by ${number(impulse.psd.level, 2)} dB: its contacts take no time, these ${quantity(own.contacts.mean_duration, "s", 2)} on average.`;
+    return `The impulse model's spectrum is off by ${number(impulse.psd.level, 2)} dB: its contacts take no time, those of ${modelName(own.name)} ${quantity(own.contacts.mean_duration, "s", 2)} on average.`;
   const furthest = others.reduce(
     (most, entry) => (Math.abs(entry.psd.level) > Math.abs(most?.psd.level ?? 0) ? entry : most),
     null,
   );
   return furthest
-    ? `Furthest from ${words(own.name)}: ${words(furthest.name)}, whose spectrum of the ${words(study.channel)} is off by ${number(furthest.psd.level, 2)} dB.`
+    ? `Furthest from ${modelName(own.name)}: ${modelName(furthest.name)}, whose spectrum of the ${words(study.channel)} is off by ${number(furthest.psd.level, 2)} dB.`
     : "No model differs from the scene's own.";
 }
 
@@ -49,11 +55,12 @@ function partingsOf(entries, part) {
   const [own, ...others] = entries;
   const all = others.filter(({ divergence }) => divergence?.time !== null);
   if (all.length === 0) return null;
-  const texts = all.map(
+  const first = all.toSorted((a, b) => a.divergence.time - b.divergence.time).slice(0, MOST_NAMED);
+  const texts = first.map(
     ({ name, divergence }) =>
-      `${words(name)} from ${quantity(divergence.time, "s")} on${divergence.is_trusted ? "" : " (or by rounding)"}`,
+      `${modelName(name)} from ${quantity(divergence.time, "s")} on${divergence.is_trusted ? "" : " (or by rounding)"}`,
   );
-  return `Displacements differ from ${words(own.name)} by more than ${share(part)} of the largest: ${texts.join(", ")}.`;
+  return `Displacements differ from ${modelName(own.name)} by more than ${share(part)} of the largest: ${texts.join(", ")}${all.length > first.length ? "; others later" : ""}.`;
 }
 
 export function CompareStudy() {
@@ -84,7 +91,7 @@ export function CompareStudy() {
     <${Spectra} entries=${entries} study=${study} />
     <${Motions} entries=${entries} study=${study} />
     <${Numbers} entries=${entries} units=${units} />
-    ${refused.map(({ name, why }) => html`<p class="hint">${`Not run: ${words(name)}. ${why}.`}</p>`)}`;
+    ${refused.map(({ name, why }) => html`<p class="hint">${`Not run: ${modelName(name)}. ${sentence(why).replace(", is ", "; it is ")}`}</p>`)}`;
 }
 
 function Differences({ entries, measure }) {
@@ -94,13 +101,13 @@ function Differences({ entries, measure }) {
     .filter(({ value }) => value !== null)
     .sort((a, b) => Math.abs(b.value) - Math.abs(a.value))
     .map(({ entry, at, value }) => ({
-      label: words(entry.name),
+      label: modelName(entry.name),
       to: value,
       color: `c${((at + 1) % 8) + 1}`,
       text: measure.text(value),
     }));
   return html`<${Bars}
-    title=${`Apart from ${words(own.name)}`}
+    title=${`Difference from ${modelName(own.name)}`}
     x=${{ label: measure.axis, unit: "1" }}
     rows=${rows}
   />`;
@@ -112,10 +119,9 @@ function Spectra({ entries, study: { frequency, channel, unit } }) {
   const series = useMemo(
     () =>
       entries.map(({ name, density }, at) => ({
-        label: words(name),
+        label: modelName(name),
         color: colorOf(at),
-        x: frequency,
-        y: density,
+        ...bandLine({ x: frequency, y: density }),
       })),
     [entries],
   );
@@ -123,7 +129,7 @@ function Spectra({ entries, study: { frequency, channel, unit } }) {
     title=${`Spectra of the ${words(channel)}`}
     height=${300}
     x=${{ label: "Frequency", unit: "Hz", log: true }}
-    y=${{ label: `Spectrum of the ${words(channel)}`, unit, log: true }}
+    y=${{ label: `Spectrum of the ${words(channel)} by third octaves`, unit, log: true }}
     series=${series}
   />`;
 }
@@ -134,7 +140,7 @@ function Motions({ entries, study }) {
     () =>
       entries.map(({ name, trace: { minimum, maximum } }, at) => ({
         kind: "band",
-        label: words(name),
+        label: modelName(name),
         color: colorOf(at),
         x: minimum.map((_, index) => index / study.trace_rate),
         low: minimum,
@@ -145,7 +151,7 @@ function Motions({ entries, study }) {
   const rules = entries
     .map(({ name, divergence }, at) => ({
       x: divergence?.time,
-      label: `${words(name)} parts`,
+      label: `${modelName(name)} differs`,
       color: colorOf(at),
     }))
     .filter(({ x }) => Number.isFinite(x));
@@ -159,14 +165,17 @@ function Motions({ entries, study }) {
   />`;
 }
 
+// But for rounding.
+const isEqual = (a, b) => a === b || Math.abs(a - b) <= 1e-6 * Math.abs(a);
+
 function Numbers({ entries, units }) {
   const metrics = Object.keys(entries[0].summary).filter(
     (key) =>
       !/residual|estimate|horizon/.test(key) &&
-      entries.some(({ summary }) => summary[key] !== entries[0].summary[key]),
+      entries.some(({ summary }) => !isEqual(summary[key], entries[0].summary[key])),
   );
   const columns = [
-    { label: "Contact model", value: ({ name }) => words(name) },
+    { label: "Contact model", value: ({ name }) => modelName(name) },
     ...metrics.map((key) => ({
       label: title(key),
       unit: units[key] ?? "1",
@@ -178,8 +187,13 @@ function Numbers({ entries, units }) {
       isNumeric: true,
       value: ({ contacts }) => contacts.mean_restitution,
     },
-    { label: "Spectrum apart by [dB]", isNumeric: true, digits: 3, value: ({ psd }) => psd?.level },
-    { label: "Parts at", unit: "s", digits: 3, value: ({ divergence }) => divergence?.time },
+    {
+      label: "Spectrum level [dB]",
+      isNumeric: true,
+      digits: 3,
+      value: ({ psd }) => psd?.level,
+    },
+    { label: "Differs from", unit: "s", digits: 3, value: ({ divergence }) => divergence?.time },
   ];
   return html`<${Table} caption="Numbers that differ" columns=${columns} rows=${entries} />`;
 }

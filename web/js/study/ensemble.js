@@ -125,13 +125,13 @@ function Shares({ indices, metric }) {
     .sort((a, b) => b.total - a.total)
     .map(({ pointer, total, total_interval_95: interval, first }) => ({
       label: memberName(pointer),
-      to: total,
-      interval,
+      to: 100 * total,
+      interval: interval?.map((end) => 100 * end),
       text: `${number(100 * total, 3)} % (alone ${number(100 * first, 3)} %)`,
     }));
   return html`<${Bars}
     title=${`What the variance of the ${words(metric)} comes from`}
-    x=${{ label: "Share of the variance, with interactions (Sobol); 95 % intervals", unit: "1" }}
+    x=${{ label: "Total Sobol index with its 95 % interval [%]", unit: "1" }}
     rows=${rows}
   />`;
 }

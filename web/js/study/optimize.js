@@ -12,6 +12,7 @@ import { Table } from "../ui/table.js";
 import { quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
 import { Decision, SceneLink, between, memberName, sentence } from "./parts.js";
+import { SearchMap } from "./search_map.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 
@@ -83,7 +84,7 @@ function Gain({ study: { best, given, undamped }, units }) {
       ].map(([name, { metrics: of }, color]) => ({
         label: `${title(metric)}, ${name}`,
         from: 0,
-        to: of[metric] / undamped.metrics[metric],
+        to: (100 * of[metric]) / undamped.metrics[metric],
         color,
         text: quantity(of[metric], units[metric], 3),
       })),
@@ -100,15 +101,25 @@ function Gain({ study: { best, given, undamped }, units }) {
     of("Given", given),
     of("Without dampers", undamped),
   ];
-  return html`${rows.length > 0 && html`<${Bars} title="Gain" x=${{ label: "As a part of the structure without dampers", unit: "1" }} rows=${rows} origin=${1} />`}
-    <${Table} caption="Gain" columns=${columns} rows=${metrics} />`;
+  return html`${rows.length > 0 && html`<${Bars} title="Against the structure without dampers" x=${{ label: "Of the structure without dampers [%]", unit: "1" }} rows=${rows} origin=${100} />`}
+    <${Table}
+      caption="Against the structure without dampers"
+      columns=${columns}
+      rows=${metrics}
+    />`;
 }
 
-// The first objective of every candidate over the variable of numbers, by what else was chosen.
+// The first objective of every candidate: a map over two numbers, else over the first number by what else was chosen.
 function Search({ study: { history, best, objectives }, unit, unitOf }) {
   const [{ metric }] = objectives;
+  const label = `${title(metric)} of every candidate`;
   const variables = history[0]?.values ?? [];
-  const at = variables.findIndex(({ value }) => typeof value === "number");
+  const numbers = [...variables.keys()].filter((at) => typeof variables[at].value === "number");
+  const [at] = numbers;
+  const axisOf = (one) => ({
+    label: title(memberName(pointerOf(one))),
+    unit: unitOf(one) ?? "1",
+  });
   const groups = useMemo(() => {
     const named = ({ values }) =>
       values
@@ -117,8 +128,23 @@ function Search({ study: { history, best, objectives }, unit, unitOf }) {
         .join(", ");
     return [...Map.groupBy(history, (one) => named(one) || "candidates")].slice(0, 8);
   }, [history]);
-  if (at < 0) return null;
-  const variable = variables[at];
+  if (numbers.length === 0) return null;
+  if (numbers.length === 2 && variables.length === 2) {
+    const isBest = (values) =>
+      values.every((one, index) => one.value === best?.values[index].value);
+    const points = history.map(({ values, objectives: [value] }) => ({
+      at: values.map((one) => one.value),
+      value,
+      isBest: isBest(values),
+    }));
+    return html`<${SearchMap}
+      title="The search"
+      label=${label}
+      unit=${unit}
+      axes=${variables.map(axisOf)}
+      points=${points}
+    />`;
+  }
   const series = groups.map(([label, rows], index) => ({
     kind: "points",
     size: 7,
@@ -127,13 +153,12 @@ function Search({ study: { history, best, objectives }, unit, unitOf }) {
     x: rows.map(({ values }) => values[at].value),
     y: rows.map(({ objectives }) => objectives[0] ?? NaN),
   }));
-  const name = memberName(pointerOf(variable));
   const chosen = best?.values[at].value;
   return html`<${Chart}
     title="The search"
     height=${260}
-    x=${{ label: title(name), unit: unitOf(variable) ?? "1" }}
-    y=${{ label: `${title(metric)} of every candidate`, unit }}
+    x=${axisOf(variables[at])}
+    y=${{ label, unit }}
     series=${series}
     rules=${chosen === undefined ? [] : [{ x: chosen, label: "best", color: "ok" }]}
   />`;

@@ -11,9 +11,11 @@ export const plainScene = ({ study, ...scene }) => scene;
 export const memberName = (pointer) =>
   words(pointer.replace(/^\/(dampers\/0\/)?/, "").replaceAll("/", " "));
 
-// A clause of the service as a sentence.
+// A clause of the service as a sentence; a member is named by its words.
 export const sentence = (clause) =>
-  `${clause.replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase())}.`;
+  `${clause
+    .replace(/^(\/\S+):/, (_, pointer) => memberName(pointer))
+    .replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase())}.`;
 
 export const between = (low, high, unit) =>
   `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;

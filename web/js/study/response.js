@@ -117,11 +117,14 @@ export function ResponseStudy() {
   const periods = [...new Set(points.map(({ period }) => period))].filter((period) => period > 1);
   const unstable = points.filter(({ stable }) => stable === false).length;
   const irregular = points.filter(({ period }) => !period).length;
-  const facts = [
+  const counts = [
     periods.length > 0 &&
       `Motions that repeat after ${periods.sort((a, b) => a - b).join(", ")} cycles of the load were found too.`,
     irregular > 0 && `${irregular} of ${points.length} points have no period.`,
     unstable > 0 && `${unstable} motions are unstable: none of them lasts.`,
+  ];
+  const facts = [
+    counts.filter(Boolean).join(" "),
     ...study.warnings.map(({ detail }) => sentence(detail)),
   ];
   return html`<${Decision} more=${facts}>${decisionOf(points, name, unit)}<//>

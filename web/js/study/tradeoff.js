@@ -1,5 +1,5 @@
-// Error against CPU time of every way to run a scene, and which to take.
-import { html, useMemo, useState } from "../ui/preact.js";
+// Error against CPU time of every way to run a scene, and which to take. In the address: way (a name).
+import { html, useMemo } from "../ui/preact.js";
 import { go, pack } from "../address.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
@@ -24,27 +24,37 @@ function applied(scene, way) {
   };
 }
 
-// "rk4, step 0.0001 s" as "rk4, step …": ways that differ in a number alone.
-const familyOf = ({ name }) => name.replace(/ [\d.e-]+( \w+)?$/, " …");
+// "rk4, step 1e-05 s" as "rk4, step 10 µs".
+const readable = (text) =>
+  text
+    .replace(/(\d[\d.e-]*) s\b/g, (_, seconds) => quantity(Number(seconds), "s", 3))
+    .replace(/\d[\d.]*e-?\d+/g, (digits) => number(Number(digits)));
+
+// Ways that differ in a number alone: "rk4, any step".
+const familyOf = ({ name }) =>
+  name.replace(
+    /, (?:(step|tolerance) |(sampled) at )[\d.e-]+.*$/,
+    (_, kind) => `, any ${kind ?? "sample rate"}`,
+  );
 
 function noteOf(point, taken) {
   if (point.why) return point.why;
   if (point === taken) return "recommended";
-  return point.is_best || point.status !== "measured" ? "" : "beaten in both";
+  return point.is_best || point.status !== "measured" ? "" : "another is faster and closer";
 }
 
 function decisionText(taken, metric, unit, recommendation) {
   if (!taken) return `${recommendation.why}.`;
   const error = taken.errors[metric];
   const size = unit === "dB" ? quantity(error, "dB", 2) : share(error, 2);
-  return `Take ${taken.name}: ${words(metric)} wrong by ${size}, ${quantity(taken.cpu_minimum, "s", 2)} of CPU time a run.`;
+  return `Take ${readable(taken.name)}: ${words(metric)} wrong by ${size}, ${quantity(taken.cpu_minimum, "s", 2)} of CPU time a run.`;
 }
 
 export function TradeoffStudy() {
-  const { result } = useResult();
+  const { result, query, change } = useResult();
   const { scene, study } = result;
   const { metric, points, recommendation, error: wanted } = study;
-  const [chosen, setChosen] = useState(null); // a point
+  const chosen = points.find(({ name }) => name === query.way);
   const unit = metric === "psd" ? "dB" : "1";
   const taken = points[recommendation.point - 1];
   const error = (point) => point.errors[metric];
@@ -81,56 +91,59 @@ export function TradeoffStudy() {
     ];
   }, [measured]);
   const open = async (way) => go("scene", { s: await pack(applied(scene, way)) });
-  const marker = (plot) => {
-    if (!measured.includes(taken)) return null;
-    const [x, y] = [plot.x.to(taken.cpu_minimum), plot.y.to(shown(taken))];
+  const marked = [taken, chosen].filter((point) => measured.includes(point));
+  const marker = (plot) => [...new Set(marked)].map((point) => markerOf(point, plot));
+  const markerOf = (point, plot) => {
+    const [x, y] = [plot.x.to(point.cpu_minimum), plot.y.to(shown(point))];
     const isLate = x > (plot.left + plot.right) / 2;
     return html`<g class="pointer">
       <circle cx=${x} cy=${y} r="9" />
       <text x=${isLate ? x - 14 : x + 14} y=${y - 12} text-anchor=${isLate ? "end" : "start"}>
-        ${`take ${taken.name}`}
+        ${point === taken ? `take ${readable(point.name)}` : readable(point.name)}
       </text>
     </g>`;
   };
+  const errorLabel = `${unit === "dB" ? "Error" : "Relative error"} of the ${words(metric)}`;
   const columns = [
     {
       label: "Way",
       value: ({ name }) => name,
       cell: (point) =>
         html`<${SceneLink}
-          label=${point.name}
+          label=${readable(point.name)}
           load=${() => applied(scene, point)}
           keys=${[result.id]}
         />`,
     },
     { label: "CPU time", unit: "s", value: (point) => point.cpu_minimum },
-    { label: `Error of ${words(metric)}`, unit, digits: 3, value: error },
+    { label: errorLabel, unit, digits: 3, value: error },
     { label: "Steps", isNumeric: true, value: (point) => point.steps },
     { label: "Note", value: (point) => noteOf(point, taken) },
   ];
-  const why = recommendation.why.replace(/\d[\d.]*e-?\d+/g, (text) => number(Number(text)));
+  // The rest repeats the numbers of the way that is taken.
+  const [, why] = recommendation.why.split("; ");
   return html`<${Decision}
-      more=${[`${capital(why)}.`, `Errors are relative to ${study.reference.solver}, whose own is ${number(study.reference.error_estimate, 2)}.`]}
+      more=${[taken && why && `${capital(readable(why))}.`, `Errors are relative to ${study.reference.solver}, whose own is ${number(study.reference.error_estimate, 2)}.`]}
       actions=${taken && html`<${SceneLink} className="button primary" label="Use it in the scene" load=${() => applied(scene, taken)} keys=${[result.id]} />`}
     >
       ${decisionText(taken, metric, unit, recommendation)}
     <//>
     <${Chart}
       title="Error against cost"
-      description="Down and to the left is better; a click on a point opens the scene run that way."
+      description="Down and to the left is better; a click on a point names it."
       height=${340}
       x=${{ label: "CPU time of a run", unit: "s", log: true }}
-      y=${{ label: `Error of ${words(metric)}`, unit, log: true }}
+      y=${{ label: errorLabel, unit, log: true }}
       series=${series}
-      rules=${wanted > 0 ? [{ y: wanted, label: "wanted", color: "quiet" }] : []}
-      onPick=${(line, index) => setChosen(line.ways[index])}
+      rules=${wanted > 0 ? [{ y: wanted, label: "wanted error", color: "quiet" }] : []}
+      onPick=${(line, index) => change({ way: line.ways[index].name }, true)}
     >
       ${marker}
     <//>
     ${
       chosen
         ? html`<p role="status">
-            ${`${chosen.name}: error ${number(error(chosen), 3)}, ${quantity(chosen.cpu_minimum, "s", 3)}. `}
+            ${`${readable(chosen.name)}: error ${number(error(chosen), 3)}, ${quantity(chosen.cpu_minimum, "s", 3)}. `}
             <button type="button" onClick=${() => open(chosen)}>Use this way in the scene</button>
           </p>`
         : html`<p class="hint">Down and to the left is better. A click on a point names it.</p>`
@@ -138,7 +151,7 @@ export function TradeoffStudy() {
     <${Table}
       caption="Ways to run this scene, each a link to use it"
       columns=${columns}
-      rows=${points}
+      rows=${[...points].sort((a, b) => Number(b === taken) - Number(a === taken))}
       keyOf=${({ name }) => name}
       chosenKey=${taken?.name}
     />`;
