@@ -30,10 +30,12 @@ enum { MEASURED_MIN = 16, SEGMENT = 4096 }; // samples; of the spectra
 typedef enum MeasuredQuantity {
     QUANTITY_ACCELERATION,
     QUANTITY_VELOCITY,
-    QUANTITY_DISPLACEMENT
+    QUANTITY_DISPLACEMENT,
+    QUANTITY_FORCE
 } MeasuredQuantity;
-static const char *const quantity_names[] = {"acceleration", "velocity", "displacement", NULL};
-static const char *const quantity_units[] = {"m/s^2", "m/s", "m"};
+static const char *const quantity_names[] = {"acceleration", "velocity", "displacement", "force",
+                                             NULL};
+static const char *const quantity_units[] = {"m/s^2", "m/s", "m", "N"};
 
 typedef enum Align { ALIGN_GIVEN, ALIGN_AUTO } Align;
 static const char *const align_names[] = {"given", "auto", NULL};
@@ -51,6 +53,7 @@ typedef struct MeasuredRequest {
     int align;         // Align
     double shift;      // [s]
     double most_shift; // [s]
+    bool densities;
 } MeasuredRequest;
 
 // clang-format off
@@ -69,6 +72,7 @@ static const Field measured_request_fields[] = {
     FIELD_CHOICE(MeasuredRequest, align, align_names, ALIGN_GIVEN, "given: by shift; auto: the shift at which both correlate best"),
     FIELD_REAL(MeasuredRequest, shift, "s", WITHIN(-1e9, 1e9), 0, "that the measured samples are moved by to later times, under given"),
     FIELD_REAL(MeasuredRequest, most_shift, "s", ABOVE(0), OPTIONAL, "under auto, within which it is sought; anywhere if absent"),
+    FIELD_FLAG(MeasuredRequest, densities, false, "answer both densities too"),
     FIELD_END
 };
 
@@ -422,6 +426,7 @@ static Status measured_read_text(const Request *request, MeasuredRequest *asked,
     TRY(request_number(request, "shift", -1e9, 1e9, 0, &asked->shift, problem));
     TRY(request_number(request, "most_shift", 1e-12, 1e9, (double)NAN, &asked->most_shift,
                        problem));
+    TRY(request_flag(request, "densities", &asked->densities, problem));
     TRY(request_number(request, "interval", 1e-9, 1e6, (double)NAN, &options.interval, problem));
     const Status status = records_read_motion(request, &options, &motion, problem);
     asked->measured =
@@ -496,6 +501,18 @@ static Status measured_spectra(const Signal *a, const Signal *b, Spectrum *spect
     return status;
 }
 
+// Further members of "psd".
+static void measured_put_densities(Bytes *bytes, const Spectrum *spectrum) {
+    static const char *const names[] = {"frequency", "a", "measured"};
+    const double *const lists[] = {spectrum->frequency, spectrum->densities.at[0].values,
+                                   spectrum->densities.at[1].values};
+    for (size_t i = 0; i < COUNT(lists); i++) {
+        bytes_json(bytes, ", \"%s\": [", names[i]);
+        bytes_reals(bytes, lists[i], spectrum->densities.rows);
+        bytes_text(bytes, "]");
+    }
+}
+
 static void measured_write(Bytes *bytes, const char *result, const Column *column,
                            const MeasuredRequest *asked, double shift, const Signal *a,
                            const Signal *b, const Spectrum *spectrum) {
@@ -511,6 +528,8 @@ static void measured_write(Bytes *bytes, const char *result, const Column *colum
     encode_item(bytes, signal_comparison_fields, &comparison, WRITE_REPORT);
     bytes_json(bytes, ", \"psd\": {\"segment\": %zu, ", spectrum->settings.segment);
     encode_members(bytes, spectrum_distance_fields, &distance, WRITE_REPORT);
+    if (asked->densities)
+        measured_put_densities(bytes, spectrum);
     bytes_text(bytes, "}, \"warnings\": [");
     if (b->rate > a->rate * (1 + 1e-9))
         compare_put_warning(bytes,

@@ -12,8 +12,8 @@ static const char *const of_series[] = {"channels", "from", "to", "points", NULL
 static const char *const of_impacts[] = {"from", "to", "first", "limit", NULL};
 static const char *const of_force[] = {"points", NULL};
 static const char *const of_compare[] = {"a", "b", NULL};
-static const char *const of_measured[] = {"a",          "channel",  "align", "shift",
-                                          "most_shift", "interval", "unit",  NULL};
+static const char *const of_measured[] = {"a",         "channel",  "align", "shift", "most_shift",
+                                          "densities", "interval", "unit",  NULL};
 static const char *const of_calibration[] = {"material", "damper", NULL};
 static const char *const of_import[] = {"dry_run", NULL};
 static const char *const of_materials[] = {"q",   "kind",  "status", "e",

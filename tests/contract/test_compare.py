@@ -292,6 +292,11 @@ def test_a_measured_motion_is_set_beside_a_result():
         band = (frequency >= told["psd"]["from"]) & (frequency <= told["psd"]["to"])
         level = numpy.sqrt(numpy.mean((10 * numpy.log10(density[band] / wanted[band])) ** 2))
         assert told["psd"]["segment"] == 3000 and close(told["psd"]["level"], level, 1e-6)
+        both = post(measured=measured(part), shift=0.4, densities=True)
+        lists = {name: both["psd"].pop(name) for name in ("frequency", "a", "measured")}
+        assert both == told
+        for name, values in (("frequency", frequency), ("a", wanted), ("measured", density)):
+            assert numpy.allclose(lists[name], values, 1e-9, 1e-12 * max(values)), name
         found = post(measured=measured(part), align="auto")
         assert abs(found["shift"] - 0.4) < 1e-3 and found["motion"]["correlation"] > 0.99
         assert abs(post(measured=measured(part), align="auto", most_shift=0.1)["shift"]) <= 0.101
@@ -302,6 +307,10 @@ def test_a_measured_motion_is_set_beside_a_result():
         own = daemon.request("POST", "/v1/compare", json={"a": job["id"], "measured": measured(
             series(daemon, job["result"])["displacement"], quantity="displacement")}).json()
         assert own["channel"] == "displacement" and own["motion"]["relative"] == 0
+        forces = program.finished(daemon, scene(output={"channels": ["contact_force"]}))["result"]
+        own = daemon.request("POST", "/v1/compare", json={"a": forces, "channel": "contact_force", "measured": measured(
+            series(daemon, forces)["contact_force"], quantity="force")}).json()
+        assert own["unit"] == "N" and own["motion"]["relative"] == 0
 
 
 def test_what_does_not_fit_a_comparison_is_told():
@@ -340,6 +349,8 @@ def test_a_measurement_comes_as_a_table_too():
         assert told["motion"]["samples"] == 1601 and told["motion"]["relative"] < 1e-12, told["motion"]
         found = daemon.request("POST", "/v1/compare", json={**asked, "align": "auto"})
         assert post("&align=auto", table).body == found.body
+        found = daemon.request("POST", "/v1/compare", json={**asked, "densities": True})
+        assert post("&shift=0.01&densities=1", table).body == found.body
         for query, body, status, words in (
                 ("", b"time [s],acceleration [m/s^2]\n0,1\n0.1,x\n", 400, "line 3"),
                 ("&align=best", table, 422, "given, auto"), ("&unit=mm", table, 422, "cm/s^2"), ("&shift=x", table, 400, "shift"),
@@ -366,7 +377,7 @@ def test_faults_of_a_measurement_are_told_at_their_places():
                                 ({"measured": measured(range(15))}, "/measured/samples"),
                                 ({"measured": measured(range(100), 0)}, "/measured/interval"),
                                 ({"measured": measured(["x"] * 100)}, "/measured/samples/0"),
-                                ({"measured": measured(range(100), quantity="force")}, "/measured/quantity"),
+                                ({"measured": measured(range(100), quantity="strain")}, "/measured/quantity"),
                                 ({"channel": "contact_force"}, "/channel"), ({"channel": "displacement"}, "/channel"),
                                 ({"align": "best"}, "/align"), ({"shift": "auto"}, "/shift"), ({"b": 1}, "/b"),
                                 ({"most_shift": 0}, "/most_shift")):

@@ -12,11 +12,11 @@ import { useResult, windowOf } from "./context.js";
 import { readMeasured, VALUE_UNITS } from "./measured_file.js";
 import { quantityColor } from "./motion.js";
 import { timeOfEnergy } from "./series.js";
-import { welch } from "./welch.js";
 
 const MOST_SAMPLES = 2e6;
 const AUDIBLE = 1e-3; // of the loudest third octave: quieter ones are not put into words
-const SEGMENTS = 4; // of the common span at least
+const PAUSE = 200; // ms that a shift stands before it is sent
+const QUANTITIES = { m: "displacement", "m/s": "velocity", "m/s^2": "acceleration", N: "force" };
 
 // Channels that a measurement in this unit can be compared with; without a unit all that have one.
 function channelsFor(result, unit) {
@@ -38,20 +38,17 @@ async function loadChannel(path, channel, signal) {
   return { time, values };
 }
 
-// The shift at which both correlate best, as the service finds it; 0 for what it does not compare.
-async function findShift(result, channel, measured, signal) {
-  const quantityOf = { m: "displacement", "m/s": "velocity", "m/s^2": "acceleration" };
-  const kind = quantityOf[result.units[channel]];
-  if (!kind) return 0;
-  const { interval, start, values } = measured;
-  const samples = Array.from(values);
+// The service's comparison, with both densities: at a shift, or at the one where both correlate best.
+function compareMeasured(result, channel, { interval, start, values }, shift, signal) {
+  const quantity = QUANTITIES[result.units[channel]];
   const body = {
     a: result.id,
     channel,
-    measured: { samples, interval, start, quantity: kind },
-    align: "auto",
+    measured: { samples: Array.from(values), interval, start, quantity },
+    densities: true,
+    ...(shift === undefined ? { align: "auto" } : { shift }),
   };
-  return (await post("v1/compare", body, { signal })).shift;
+  return post("v1/compare", body, { signal });
 }
 
 // The value at an instant, between samples on a line; null outside.
@@ -63,44 +60,21 @@ function valueAt({ start, interval, values }, instant) {
   return values[low] + Math.max(0, place - low) * (next - values[low]);
 }
 
-// What both are over their common span, at the samples of the coarser one: {time, difference, rms, own, correlation, from, to},
-// `own` being the rms of the simulated one; null where they have none.
-function compareMotions(series, measured, shift, rate) {
+// {x, y} over the common span, at the samples of the coarser one; null where they have none.
+function differenceOf(series, measured, shift, rate) {
   const simulated = { start: 0, interval: 1 / rate, values: series.values };
   const later = { ...measured, start: measured.start + shift };
   const coarser = measured.interval > simulated.interval ? later : simulated;
-  const [time, difference] = [[], []];
-  const sums = { square: 0, own: 0, other: 0, product: 0 };
+  const [x, y] = [[], []];
   for (let at = 0; at < coarser.values.length; at++) {
     const instant = coarser.start + at * coarser.interval;
     const own = valueAt(simulated, instant);
     const other = valueAt(later, instant);
     if (own === null || other === null) continue;
-    time.push(instant);
-    difference.push(other - own);
-    sums.square += (other - own) ** 2;
-    sums.own += own * own;
-    sums.other += other * other;
-    sums.product += own * other;
+    x.push(instant);
+    y.push(other - own);
   }
-  if (time.length < 2) return null;
-  return {
-    time,
-    difference,
-    from: time[0],
-    to: time[time.length - 1],
-    rms: Math.sqrt(sums.square / time.length),
-    own: Math.sqrt(sums.own / time.length),
-    correlation: sums.product / Math.sqrt(sums.own * sums.other),
-  };
-}
-
-// Both spectra over the common span, by the same segments in time.
-function spectraOf(series, measured, shift, { from, to }, rate) {
-  const seconds = Math.min((to - from) / SEGMENTS, 4096 / rate);
-  const simulated = { start: 0, interval: 1 / rate, values: series.values };
-  const later = { ...measured, start: measured.start + shift };
-  return [simulated, later].map((signal) => welch(signal, { from, to, seconds }));
+  return x.length < 2 ? null : { x, y };
 }
 
 // The measurement in a text file, or what is wrong with it.
@@ -137,13 +111,23 @@ function Measured({ file }) {
     [result.id, channel],
   );
   const found = useLoaded(
-    (signal) => (channel ? findShift(result, channel, measured, signal) : 0),
+    (signal) => (channel ? compareMeasured(result, channel, measured, undefined, signal) : null),
     [result.id, channel, measured],
+  );
+  const best = found.data?.shift ?? 0;
+  const shift = query.shift === undefined ? best : Number(query.shift) || 0;
+  const compared = useLoaded(
+    async (signal) => {
+      if (!channel || found.isLoading) return null;
+      if (found.data?.shift === shift) return found.data;
+      await new Promise((resolve) => setTimeout(resolve, PAUSE));
+      return signal.aborted ? null : compareMeasured(result, channel, measured, shift, signal);
+    },
+    [found, shift],
   );
   if (!channel) return html`<p>${`The result has no channel in ${pretty(file.unit)}.`}</p>`;
   if (result.count > MOST_SAMPLES)
     return html`<p>The result has too many samples to be drawn here.</p>`;
-  const shift = query.shift === undefined ? (found.data ?? 0) : Number(query.shift) || 0;
   return html`<div class="row level measured-row">
       <span
         ><strong>${`${file.name} `}</strong>
@@ -173,8 +157,8 @@ function Measured({ file }) {
       <input
         type="range"
         aria-label="Shift"
-        min=${(found.data ?? 0) - 0.25}
-        max=${(found.data ?? 0) + 0.25}
+        min=${best - 0.25}
+        max=${best + 0.25}
         step="0.0005"
         value=${shift}
         onInput=${(event) => change({ shift: Number(event.currentTarget.value) })}
@@ -183,11 +167,10 @@ function Measured({ file }) {
         >Find the shift<//
       >
     </div>
-    ${found.error && html`<${Failure} error=${found.error} />`}
+    ${found.error && !compared.error && html`<${Failure} error=${found.error} />`}
     <${Loaded} loaded=${series}>
       ${(own) =>
-        own &&
-        html`<${Overlay} series=${own} measured=${measured} shift=${shift} channel=${channel} />`}
+        own && html`<${Overlay} ...${{ series: own, measured, shift, channel, compared }} />`}
     <//>`;
 }
 
@@ -210,12 +193,12 @@ function NumberField({ label, value, onChange }) {
   </label>`;
 }
 
-function Overlay({ series, measured, shift, channel }) {
+function Overlay({ series, measured, shift, channel, compared }) {
   const { result, query, change } = useResult();
   const unit = result.units[channel];
   const rate = result.sample_rate;
-  const both = useMemo(
-    () => compareMotions(series, measured, shift, rate),
+  const difference = useMemo(
+    () => differenceOf(series, measured, shift, rate),
     [series, measured, shift],
   );
   const times = useMemo(
@@ -226,11 +209,7 @@ function Overlay({ series, measured, shift, channel }) {
       ),
     [measured, shift],
   );
-  const spectra = useMemo(
-    () => (both && both.to > both.from ? spectraOf(series, measured, shift, both, rate) : null),
-    [both],
-  );
-  if (!both)
+  if (!difference)
     return html`<p role="status">
       The measured samples do not overlap with the result: change the shift.
     </p>`;
@@ -244,18 +223,10 @@ function Overlay({ series, measured, shift, channel }) {
     change({ from: ends[0], to: ends[1] }, true);
   };
   const x = { label: "Time", unit: "s", domain: [0, window.end] };
-  const bands = spectra ? bandDifferences(...spectra) : [];
-  const loudest = Math.max(...bands.map(({ mean }) => mean));
-  const most = furthestBand(bands.filter(({ mean }) => mean > AUDIBLE * loudest));
-  const sentence =
-    `Moved by ${quantity(shift, "s")}, the measurement differs by ${quantity(both.rms, unit, 3)} rms, ` +
-    `${number((100 * both.rms) / both.own, 3)} % of the simulated rms; correlation ${number(both.correlation, 3)}.`;
-  const level = most
-    ? ` Most around ${quantity(most.frequency, "Hz", 2)}: ${number(Math.abs(most.level), 2)} dB ${most.level > 0 ? "more" : "less"} measured.`
-    : "";
   const color = quantityColor(channel);
   const shared = { x, range, onRange: setRange, group: "time" };
-  return html`<p class="answer" role="status">${sentence + level}</p>
+  return html`${compared.error && html`<${Failure} error=${compared.error} />`}
+    ${compared.data && html`<${Answer} answer=${compared.data} />`}
     <${Chart}
       ...${shared}
       title=${`Measured and simulated ${words(channel)}`}
@@ -272,18 +243,35 @@ function Overlay({ series, measured, shift, channel }) {
       title="Measured less simulated"
       y=${{ label: "Difference", unit }}
       height=${90}
-      series=${[{ label: "measured less simulated", color: "measured", x: both.time, y: both.difference }]}
+      series=${[{ label: "measured less simulated", color: "measured", ...difference }]}
     />
-    ${spectra && html`<${MeasuredSpectra} spectra=${spectra} bands=${bands} channel=${channel} color=${color} />`}`;
+    ${compared.data && html`<${MeasuredSpectra} answer=${compared.data} color=${color} />`}`;
 }
 
-function MeasuredSpectra({ spectra: [own, other], bands, channel, color }) {
-  const { result } = useResult();
-  const plain = result.units[channel];
+// Both densities {x, y} of an answer, without those at 0 Hz.
+const densitiesOf = ({ psd: { frequency, a, measured } }) =>
+  [a, measured].map((values) => ({ x: frequency.slice(1), y: values.slice(1) }));
+
+function Answer({ answer: { shift, unit, motion, ...answer } }) {
+  const bands = bandDifferences(...densitiesOf(answer));
+  const loudest = Math.max(...bands.map(({ mean }) => mean));
+  const most = furthestBand(bands.filter(({ mean }) => mean > AUDIBLE * loudest));
+  const sentence =
+    `Moved by ${quantity(shift, "s")}, the measurement differs by ${quantity(motion.difference_rms, unit, 3)} rms, ` +
+    `${number(motion.relative && 100 * motion.relative, 3)} % of the simulated rms; correlation ${number(motion.correlation, 3)}.`;
+  const level = most
+    ? ` Most around ${quantity(most.frequency, "Hz", 2)}: ${number(Math.abs(most.level), 2)} dB ${most.level > 0 ? "more" : "less"} measured.`
+    : "";
+  return html`<p class="answer" role="status">${sentence + level}</p>`;
+}
+
+function MeasuredSpectra({ answer, color }) {
+  const { channel, unit: plain } = answer;
+  const [own, other] = densitiesOf(answer);
+  const bands = bandDifferences(own, other);
   const unit = `${plain.includes("/") ? `(${plain})` : plain}^2/Hz`;
   const x = { label: "Frequency", unit: "Hz", log: true };
   const ends = [bands[0]?.low, bands[bands.length - 1]?.high];
-  const positive = ({ x: frequencies, y }) => ({ x: frequencies.subarray(1), y: y.subarray(1) });
   return html`<div class="columns">
     <${Chart}
       title=${`Spectra of the measured and simulated ${words(channel)}`}
@@ -291,8 +279,8 @@ function MeasuredSpectra({ spectra: [own, other], bands, channel, color }) {
       y=${{ label: "Density", unit, log: true }}
       height=${180}
       series=${[
-        { label: "simulated", color, ...positive(own) },
-        { label: "measured", color: "measured", ...positive(other) },
+        { label: "simulated", color, ...own },
+        { label: "measured", color: "measured", ...other },
       ]}
       group="measured-spectra"
     />
