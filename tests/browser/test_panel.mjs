@@ -37,20 +37,29 @@ test("Plots cover at least 45 % of the first screen", async ({ page, daemon, url
   assert.ok(share >= 0.45, `${share}`);
 });
 
-test("The first chart of a result comes with the processor slowed down 4 times", async ({ page, daemon, url }) => {
+test("The first chart of a result comes with the processor slowed down 4 times", async ({ newPage, daemon, url }) => {
   const { result } = await daemon.run("paper_free_sponge");
-  const session = await page.context().newCDPSession(page);
-  await session.send("Emulation.setCPUThrottlingRate", { rate: 4 });
-  await page.addInitScript(() => {
-    const watch = () => {
-      if (!document.querySelector(".plot path.line")) return requestAnimationFrame(watch);
-      requestAnimationFrame(() => (window.firstChart = performance.now()));
-    };
-    watch();
-  });
-  await page.goto(url(`#/results/${result}`));
-  const time = await until("the first chart", () => page.evaluate(() => window.firstChart));
-  console.log(`      the first chart came after ${Math.round(time)} ms`);
+  const times = [];
+  for (let visit = 0; visit < 5; visit++) {
+    const page = await newPage();
+    const session = await page.context().newCDPSession(page);
+    await session.send("Emulation.setCPUThrottlingRate", { rate: 4 });
+    // Told by the page: asking it would cost some of its time.
+    await page.addInitScript(() => {
+      const observer = new MutationObserver(() => {
+        if (!document.querySelector(".plot path.line")) return;
+        observer.disconnect();
+        requestAnimationFrame(() => console.info(`first chart ${Math.round(performance.now())}`));
+      });
+      observer.observe(document, { childList: true, subtree: true });
+    });
+    const chart = page.waitForEvent("console", { predicate: (message) => message.text().startsWith("first chart") });
+    await page.goto(url(`#/results/${result}`));
+    times.push(Number((await chart).text().split(" ").at(-1)));
+    await page.close();
+  }
+  times.sort((one, other) => one - other);
+  console.log(`      the first chart came after ${times[2]} ms, of 5 visits ${times[0]} to ${times[4]} ms`);
 });
 
 test("The best clearance is two clicks away: the cost of the sweep, then its answer", async ({ page, daemon, url }) => {

@@ -134,9 +134,10 @@ def test_planted_faults_are_found():
 
 
 def imports(path):
-    """Paths from web/ of what a file loads: modules by import, everything else by the page's tags."""
+    """Paths from web/ of what a file loads: modules by import, everything else by the page's tags. A preload is no use of a file."""
     if path.endswith(".html"):
-        return {link.removeprefix("web/") for link in re.findall(r'(?:href|src)="(web/[^"]+)"', text(path))}
+        preloaded = set(re.findall(r'"modulepreload" href="web/([^"]+)"', text(path)))
+        return {link.removeprefix("web/") for link in re.findall(r'(?:href|src)="(web/[^"]+)"', text(path))} - preloaded
     if not path.endswith(".js"):
         return set()
     source = without_comments(text(path))
@@ -158,6 +159,8 @@ def test_every_file_is_used_and_every_import_is_there():
         assert os.path.isfile(os.path.join(WEB, path)), f"{path} is imported and not there"
         reached.add(path)
         ahead |= imports(path) - reached
+    preloaded = set(re.findall(r'"modulepreload" href="web/([^"]+)"', text("index.html")))
+    assert preloaded <= reached, sorted(preloaded - reached)
     unused = {path for path in own_files() if embedded(path) and not path.startswith(OF_THE_GUIDE)} - reached
     assert not unused, sorted(unused)
 

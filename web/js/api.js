@@ -1,6 +1,6 @@
 // The service over HTTP: the one place that fetches. Paths of our own are written without a slash ("v1/jobs"), those of
 // answers' links as they came.
-import { createStore } from "./ui/store.js";
+import { createStore } from "./store.js";
 
 // What a problem document says (RFC 9457), or that nobody answered (status 0).
 class Refusal extends Error {
@@ -70,9 +70,22 @@ export async function ask(method, path, { signal = shown, ...more } = {}) {
   return response;
 }
 
+const json = async (path, query, signal) => (await ask("GET", path, { query, signal })).json();
+
+// What is asked for while the modules of the page that will get() it are on their way.
+const early = new Map();
+export function askAhead(path) {
+  const answer = json(path);
+  early.set(path, answer);
+  answer.catch(() => {}); // who gets it hears of it
+}
+
 // The answer's JSON.
-export const get = async (path, query, signal) =>
-  (await ask("GET", path, { query, signal })).json();
+export function get(path, query, signal) {
+  const answer = query ? null : early.get(path);
+  if (answer) early.delete(path);
+  return answer ?? json(path, query, signal);
+}
 export const post = async (path, json, options) =>
   (await ask("POST", path, { ...options, json })).json();
 export const remove = async (path) => (await ask("DELETE", path)).json();

@@ -1,14 +1,10 @@
-// Which page is shown, and what stands around it: navigation, theme, units, token.
+// Which page is shown, and what stands around it: navigation, theme, units, token. Without Preact: what the page begins with
+// is asked for before that is here.
 import { read } from "./address.js";
-import { get, onUnauthorised, readUntil, session, token } from "./api.js";
+import { askAhead, get, onUnauthorised, readUntil, session, token } from "./api.js";
 import { settings } from "./settings.js";
 import { themed } from "./theme.js";
 import { announce } from "./ui/announce.js";
-import { Failure } from "./ui/controls.js";
-import { html, render } from "./ui/preact.js";
-import { askToken } from "./ui/token_dialog.js";
-import { UnitsMenu } from "./ui/units_menu.js";
-import { welcome } from "./ui/welcome.js";
 
 // A module's `page` is {title(address), show(host, address, signal) -> {change(address), redraw(), leave()}}: for a new query on
 // the same path, for other units, and for the end, when `signal` is aborted.
@@ -27,12 +23,18 @@ const pages = {
   shell: () => import("./shell.js"),
 };
 
-const [main, tokenButton, skip, version, welcomeBox] = [
+// What a page begins with, asked for while its modules are loaded.
+const FIRST = {
+  result: ([, id]) => `v1/results/${encodeURIComponent(id)}`,
+};
+
+const [main, tokenButton, skip, version, hint, units] = [
   "main",
   "token",
   "skip",
   "version",
   "welcome",
+  "units-menu",
 ].map((id) => document.getElementById(id));
 let current = null; // {path, stop, controller: promise}
 
@@ -67,6 +69,14 @@ async function show() {
   };
 }
 
+// The hint of a first visit stands above the scene until it is closed or the reader goes on.
+const WELCOME = "impactd.welcome";
+function welcome(isScene) {
+  hint.hidden = !isScene || localStorage.getItem(WELCOME) !== null;
+  if (!isScene) localStorage.setItem(WELCOME, "seen");
+}
+hint.querySelector("button").onclick = () => welcome(false);
+
 function element(name, className, text) {
   const made = document.createElement(name);
   if (className) made.className = className;
@@ -81,11 +91,12 @@ async function open(address, signal, isNext) {
   const section = first === "results" ? "jobs" : first;
   for (const anchor of document.querySelectorAll("#pages a"))
     anchor.ariaCurrent = anchor.hash === `#/${section}` ? "page" : null;
-  welcome(welcomeBox, first === "scene");
+  welcome(first === "scene");
   try {
     const name = nameOf(address.path);
     if (!Object.hasOwn(pages, name) || !address.path.join("/").match(ADDRESSES))
       throw new Error(`There is no page "${address.path.join("/")}" here.`);
+    if (Object.hasOwn(FIRST, name)) askAhead(FIRST[name](address.path));
     const { page } = await pages[name]();
     if (signal.aborted) return null;
     const title = page.title(address);
@@ -104,19 +115,28 @@ async function open(address, signal, isNext) {
       main.replaceChildren(element("h1", null, "This page could not be shown"));
     const box = main.appendChild(element("div", null, ""));
     const retry = () => get("version").then(() => location.reload());
+    // Both are preloaded, also when the server is away by now.
+    const [{ html, render }, { Failure }] = await Promise.all([
+      import("./ui/preact.js"),
+      import("./ui/controls.js"),
+    ]);
     render(html`<${Failure} error=${error} onRetry=${retry} />`, box);
     return null;
   }
 }
 
 themed(document.getElementById("theme"));
-render(html`<${UnitsMenu} />`, document.getElementById("units"));
+addEventListener("hashchange", show);
+show();
 settings.subscribe(async () => (await current.controller)?.redraw());
 
 const updateTokenButton = () => {
   tokenButton.hidden = !token();
 };
-const signIn = () => askToken().finally(updateTokenButton);
+const signIn = async () => {
+  const { askToken } = await import("./ui/token_dialog.js");
+  return askToken().finally(updateTokenButton);
+};
 onUnauthorised(signIn);
 updateTokenButton();
 tokenButton.onclick = async () => {
@@ -124,6 +144,12 @@ tokenButton.onclick = async () => {
   session.set((count) => count + 1);
   show();
 };
+
+units.addEventListener(
+  "beforetoggle",
+  async () => (await import("./ui/units_menu.js")).showUnits(units),
+  { once: true },
+);
 
 skip.onclick = (event) => {
   event.preventDefault();
@@ -135,5 +161,3 @@ get("version").then(
   },
   () => {}, // the page itself says so
 );
-addEventListener("hashchange", show);
-show();

@@ -1,5 +1,5 @@
 // What a reader prefers on every page: the units of numbers. Kept by the browser, part of no address.
-import { createStore } from "./ui/store.js";
+import { createStore } from "./store.js";
 
 const KEY = "impactd.units";
 

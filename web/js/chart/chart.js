@@ -64,13 +64,21 @@ function valueDomain(y, series, rules, domain) {
 //   isFixed              without zoom and cursor: the children listen to the pointer, onKeyDown to keys
 //   underlay, children   further SVG below and above the series, from the plot {x, y, left, right, top, bottom}: scales, pixels
 export function Chart(props) {
-  const { title, description, x, y, height = 200, isCompact = false, isShort = false } = props;
+  const box = useRef(null);
+  const width = useWidth(box);
+  return html`<figure class="chart" aria-label=${props.title} ref=${box}>
+    ${width > 0 && html`<${Drawn} ...${props} width=${width} />`}
+  </figure>`;
+}
+
+function Drawn(props) {
+  const { title, description, x, y, width, height = 200 } = props;
+  const { isCompact = false, isShort = false } = props;
   const { isFixed = false } = props;
   const { spans = [], rules = [], markers = [], underlay, children } = props;
   const id = useMemo(() => freshId("chart"), []);
   const box = useRef(null);
   const svg = useRef(null);
-  const width = useWidth(box);
   const [hidden, setHidden] = useState(new Set());
   const [hasNumbers, setHasNumbers] = useState(false);
   const [ownRange, setOwnRange] = useState(null);
@@ -129,8 +137,7 @@ export function Chart(props) {
   const heading = props.heading ?? (y.categories ? title : both);
   const plot = { x: xScale, y: yScale, left, right, top, bottom };
   const summary = description ?? describe(props.series, x, y, domain);
-  return html`<figure class="chart" aria-label=${title}>
-    <div class="chart-head">
+  return html`<div class="chart-head">
       <h3>${withSubscripts(heading)}</h3>
       ${props.help && html`<${Help} name=${props.help} />`}
       ${
@@ -164,14 +171,14 @@ export function Chart(props) {
           </clipPath>
         </defs>
         <${Spans} spans=${spans} plot=${plot} />
-        ${width > 0 && underlay?.(plot)}
+        ${underlay?.(plot)}
         <${YAxis} axis=${y} scale=${yScale} left=${left} right=${right} edge=${width - 2} />
         <${XAxis} axis=${x} scale=${xScale} top=${top} bottom=${bottom} isCompact=${isCompact} />
         <g clip-path=${`url(#${id}-clip)`}>
-          ${width > 0 && series.map((one) => drawSeries(one, xScale, yScale, density))}
+          ${series.map((one) => drawSeries(one, xScale, yScale, density))}
         </g>
         <${Rules} rules=${rules} plot=${plot} labels=${labels} series=${series} />
-        ${width > 0 && children?.(plot)}
+        ${children?.(plot)}
         <${Markers} markers=${markers} plot=${plot} />
       </svg>
       ${
@@ -189,8 +196,7 @@ export function Chart(props) {
     </div>
     ${!isCompact && !isShort && html`<p class="x-title" aria-hidden="true">${xTitle}</p>`}
     <p class="visually-hidden" id=${`${id}-summary`}>${summary}</p>
-    ${hasNumbers && html`<${DataTable} title=${title} series=${props.series} x=${x} y=${y} />`}
-  </figure>`;
+    ${hasNumbers && html`<${DataTable} title=${title} series=${props.series} x=${x} y=${y} />`}`;
 }
 
 // "Time [ms]" as "time [ms]".

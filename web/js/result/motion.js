@@ -9,7 +9,7 @@ import { post } from "../api.js";
 import { number, quantity, title, words } from "../units.js";
 import { useBare } from "./bare.js";
 import { channelNames, useResult, windowOf } from "./context.js";
-import { seriesOf, timeOfEnergy, useSeries } from "./series.js";
+import { isWhole, seriesOf, timeOfEnergy, useSeries } from "./series.js";
 
 const MOST_MARKERS = 300;
 const MOST_LINES = 4; // of one chart
@@ -122,12 +122,13 @@ function seriesFor(chart, { time, columns }, bare) {
   return [seriesOf(`without damper${storey}`, "ghost", bare.time, bare.column), ...series];
 }
 
-export function Motion() {
+export function Motion({ onDrawn }) {
   const context = useResult();
   const { result, query, change, ledger, path } = context;
   const box = useRef(null);
   const [pixels, setPixels] = useState(0);
   useLayoutEffect(() => {
+    if (isWhole(result)) return; // nothing depends on it
     const width = box.current.clientWidth - MARGIN.left - MARGIN.right;
     setPixels(Math.max(200, Math.round(width * (globalThis.devicePixelRatio ?? 1))));
   }, []);
@@ -139,6 +140,9 @@ export function Motion() {
   const isAuto = query.from === undefined && query.to === undefined;
   const window = windowOf(result, query);
   const loaded = useSeries({ path, result, channels, window, pixels });
+  useEffect(() => {
+    if (!loaded.isLoading) onDrawn?.();
+  }, [loaded.isLoading]);
   const bare = useBare(
     result,
     channels.findLast((channel) => wordOf(channel) === "displacement") ?? "displacement",

@@ -4,16 +4,18 @@ import { ask, get } from "../api.js";
 import { readNpy } from "../npy.js";
 import { useLoaded } from "../ui/store.js";
 
-export const MOST_SAMPLES = 50000;
+const MOST_SAMPLES = 50000;
+
+// Few enough samples to load all of them, whatever the window.
+export const isWhole = ({ count }) => count <= MOST_SAMPLES;
 
 // {time, columns: Map of channel to {values} or {low, high}, isEnvelope, bucket} of these channels.
 export async function loadSeries({ path, result, channels, window, pixels, signal }) {
-  const { sample_rate: rate, count } = result;
+  const { sample_rate: rate } = result;
   const names = channels.join();
   const inWindow = (window.to - window.from) * rate;
   if (inWindow <= MOST_SAMPLES) {
-    const isWhole = count <= MOST_SAMPLES;
-    const query = isWhole
+    const query = isWhole(result)
       ? { channels: names }
       : { channels: names, from: window.from, to: window.to };
     const response = await ask("GET", `${path}/series.npy`, { query, signal });
@@ -36,17 +38,12 @@ export async function loadSeries({ path, result, channels, window, pixels, signa
   return { time, columns: found, isEnvelope: bucket > 1, bucket };
 }
 
-// The same as the state of a view. A result of few samples is loaded once, whatever the window.
+// The same as the state of a view.
 export function useSeries({ path, result, channels, window, pixels }) {
-  const isWhole = result.count <= MOST_SAMPLES;
-  const keys = [
-    path,
-    channels.join(),
-    pixels > 0,
-    ...(isWhole ? [] : [window.from, window.to, pixels]),
-  ];
+  const isAll = isWhole(result);
+  const keys = [path, channels.join(), ...(isAll ? [] : [window.from, window.to, pixels])];
   return useLoaded(async (signal) => {
-    if (pixels === 0 || channels.length === 0) return null;
+    if (channels.length === 0 || (!isAll && pixels === 0)) return null;
     return loadSeries({ path, result, channels, window, pixels, signal });
   }, keys);
 }

@@ -1,29 +1,7 @@
-// Values that several views share: a store tells its readers of every change.
-import { useEffect, useReducer, useRef } from "./preact.js";
+// Stores and loaded data as the state of views.
+import { useEffect, useLayoutEffect, useReducer, useRef } from "./preact.js";
 
-export function createStore(initial) {
-  let value = initial;
-  const listeners = new Set();
-  return {
-    get: () => value,
-    // set(next) or set((value) => next); readers are told where the value is another one.
-    set(next) {
-      const changed = typeof next === "function" ? next(value) : next;
-      if (Object.is(changed, value)) return;
-      value = changed;
-      for (const listener of [...listeners]) listener(value);
-    },
-    // Merges members into an object.
-    patch(members) {
-      this.set({ ...value, ...members });
-    },
-    // Returns a function that ends the subscription.
-    subscribe(listener) {
-      listeners.add(listener);
-      return () => listeners.delete(listener);
-    },
-  };
-}
+export { createStore } from "../store.js";
 
 // The part of a store that a view shows; the view is drawn again when that part changes.
 export function useStore(store, select = (value) => value) {
@@ -56,9 +34,10 @@ export function useLoaded(load, keys, again = 0) {
     held.current = next;
     setState(next);
   };
-  useEffect(() => {
+  // Before the browser paints: what is asked for is on its way meanwhile.
+  useLayoutEffect(() => {
     const stop = new AbortController();
-    set({ ...held.current, error: null, isLoading: true });
+    if (!held.current.isLoading) set({ ...held.current, error: null, isLoading: true });
     Promise.resolve()
       .then(() => load(stop.signal))
       .then(
