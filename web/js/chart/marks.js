@@ -37,30 +37,26 @@ export function uprightLabels(rules, x) {
   return { height: LINE * Math.max(ends.length, Math.min(1, upright.length)), places };
 }
 
-// Whether a series is in a box of the plot, or a line of it on both sides of the box.
-function isIn(one, plot, [left, right], [low, high]) {
-  const sides = new Set();
-  for (const part of [0, 0.2, 0.4, 0.6, 0.8, 1]) {
-    const index = nearestIndex(one, plot.x.from(left + part * (right - left)));
-    const at = plot.x.to(one.x[index]);
-    if (one.kind === "points" && !(at > left - 5 && at < right + 5)) continue;
-    const [a, b] = [one.low?.[index] ?? one.y?.[index], one.high?.[index] ?? one.y?.[index]];
-    const foot = one.kind === "bars" ? plot.bottom : plot.y.to(a);
-    sides.add(Number(foot < low - 4) - Number(plot.y.to(b) > high + 4));
-  }
-  return sides.has(0) || (sides.size > 1 && one.kind !== "points");
-}
+// Whether a series is where a label of this width at (x, y) would stand.
+const isBehind = (one, plot, x, y, width) => {
+  const values = [0, 0.2, 0.4, 0.6, 0.8, 1].flatMap((part) => {
+    const at = nearestIndex(one, plot.x.from(x + part * width));
+    return one.low ? [one.low[at], one.high[at]] : [one.y[at]];
+  });
+  const places = values.filter(Number.isFinite).map(plot.y.to);
+  if (one.kind === "bars") places.push(plot.bottom);
+  return Math.min(...places) < y + 6 && Math.max(...places) > y - 14;
+};
 
 // A level rule has its label where no series is: at the right, the left or in the middle, above or below.
 function levelPlace(at, label, plot, series) {
   const { left, right, top, bottom } = plot;
-  const size = textWidth(label);
-  const starts = [right - 4 - size, left + 4, (left + right - size) / 2];
-  const places = starts.flatMap((x) => [at - 5, at + 14].map((y) => ({ x, y })));
-  const inside = places.filter(({ y }) => y - 12 > top && y < bottom);
-  const isFree = ({ x, y }) =>
-    !series.some((one) => isIn(one, plot, [x, x + size], [y - 10, y + 2]));
-  return inside.find(isFree) ?? inside[0];
+  const width = textWidth(label);
+  const places = [right - 4 - width, left + 4, (left + right - width) / 2]
+    .flatMap((x) => [at - 5, at + 14].map((y) => ({ x, y })))
+    .filter(({ y }) => y - 12 > top && y < bottom);
+  const isFree = ({ x, y }) => !series.some((one) => isBehind(one, plot, x, y, width));
+  return places.find(isFree) ?? places[0];
 }
 
 function Rule({ rule, plot, label, series }) {

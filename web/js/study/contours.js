@@ -1,13 +1,91 @@
 // A metric over two axes of numbers: filled contours with a scale of colours, the best point, the chosen one, a cursor that
-// arrow keys move.
+// arrow keys move. Each
+// level's area is where the values are at least so large; where a corner is not known there is a gap.
 import { announce } from "../ui/announce.js";
 import { html, useMemo, useState } from "../ui/preact.js";
 import { axisUnit } from "../chart/axis.js";
 import { Chart } from "../chart/chart.js";
 import { number, quantity } from "../units.js";
-import { contourPaths, levelsOf, shade } from "./contour.js";
 import { extentOfValues } from "./parts.js";
 import { placeText, rowAt } from "./sweep_model.js";
+
+// From dark to light in even steps of lightness, for any sight.
+const STOPS = [
+  [37, 45, 110],
+  [38, 99, 148],
+  [42, 147, 140],
+  [110, 190, 100],
+  [243, 225, 95],
+];
+
+export function shade(part) {
+  const place = Math.min(1, Math.max(0, part)) * (STOPS.length - 1);
+  const low = Math.min(STOPS.length - 2, Math.floor(place));
+  const mix = STOPS[low].map((from, at) =>
+    Math.round(from + (place - low) * (STOPS[low + 1][at] - from)),
+  );
+  return `rgb(${mix.join(", ")})`;
+}
+
+// The part of a triangle [{x, y, value}] where the value is at least `level`, as corners in their order.
+function clipped(triangle, level) {
+  const corners = [];
+  triangle.forEach((from, at) => {
+    const to = triangle[(at + 1) % 3];
+    if (from.value >= level) corners.push(from);
+    if (from.value >= level === to.value >= level) return;
+    const part = (level - from.value) / (to.value - from.value);
+    corners.push({ x: from.x + part * (to.x - from.x), y: from.y + part * (to.y - from.y) });
+  });
+  return corners;
+}
+
+const pathOf = (corners) =>
+  `M${corners.map(({ x, y }) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}Z`;
+
+// Calls visit(triangle) for both halves of each cell whose corners are known.
+function eachTriangle(xs, ys, valueAt, visit) {
+  for (let j = 0; j + 1 < ys.length; j++)
+    for (let i = 0; i + 1 < xs.length; i++) {
+      const corner = (di, dj) => ({ x: xs[i + di], y: ys[j + dj], value: valueAt(i + di, j + dj) });
+      const [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+      for (const triangle of [
+        [a, b, c],
+        [a, c, d],
+      ])
+        if (triangle.every(({ value }) => Number.isFinite(value))) visit(triangle);
+    }
+}
+
+// SVG path data of the area at or above `level` and of the line at it: xs and ys are pixels, valueAt(i, j) the value at
+// xs[i], ys[j].
+function contourPaths(xs, ys, valueAt, level) {
+  const areas = [];
+  const lines = [];
+  eachTriangle(xs, ys, valueAt, (triangle) => {
+    const corners = clipped(triangle, level);
+    if (corners.length > 2) areas.push(pathOf(corners));
+    const [from, to] = corners.filter(({ value }) => value === undefined);
+    if (to) lines.push(pathOf([from, to]).slice(0, -1));
+  });
+  return { area: areas.join(""), line: lines.join("") };
+}
+
+// Round levels between low and high, about `count` of them; equal ratios where `isLog`.
+export function levelsOf(low, high, count = 9, isLog = false) {
+  if (!(high > low)) return [low];
+  if (isLog) {
+    const ratio = (high / low) ** (1 / count);
+    return Array.from({ length: count }, (_, at) => low * ratio ** at);
+  }
+  const raw = (high - low) / count;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 2.5, 5, 10].find((one) => one * power >= raw) * power;
+  const first = Math.ceil(low / step) * step;
+  const levels = [low];
+  for (let level = first; level < high; level += step) if (level > low) levels.push(level);
+  return levels;
+}
 
 // The rows of the grid that is shown: rows[j][i] at the i-th value across and the j-th upwards.
 function gridOf(model, { x, over }, fixedAt) {
@@ -31,7 +109,7 @@ const nearest = (pixels, at) =>
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 // The colours of levels; their numbers are in the unit that `factor` makes.
-export const ColorScale = ({ levels, factor }) =>
+const ColorScale = ({ levels, factor }) =>
   html`<div class="color-scale" aria-hidden="true">
     ${levels.map(
       (level, at) =>
@@ -41,7 +119,7 @@ export const ColorScale = ({ levels, factor }) =>
     )}
   </div>`;
 
-export const partOf = (levels, at) => (levels.length > 1 ? at / (levels.length - 1) : 0.5);
+const partOf = (levels, at) => (levels.length > 1 ? at / (levels.length - 1) : 0.5);
 
 // The name of the upward axis along it.
 export function UpwardTitle({ axis, plot: { y, top, bottom } }) {

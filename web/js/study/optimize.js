@@ -11,8 +11,8 @@ import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
-import { Decision, SceneLink, between, memberName, sentence } from "./parts.js";
-import { SearchMap } from "./search_map.js";
+import { UpwardTitle, levelsOf, shade } from "./contours.js";
+import { Decision, SceneLink, between, extentOfValues, memberName, sentence } from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 
@@ -109,59 +109,62 @@ function Gain({ study: { best, given, undamped }, units }) {
     />`;
 }
 
-// The first objective of every candidate: a map over two numbers, else over the first number by what else was chosen.
+// The first objective of every candidate: over two numbers colours of the places, else over the first number, by what else was
+// chosen.
 function Search({ study: { history, best, objectives }, unit, unitOf }) {
   const [{ metric }] = objectives;
-  const label = `${title(metric)} of every candidate`;
   const variables = history[0]?.values ?? [];
   const numbers = [...variables.keys()].filter((at) => typeof variables[at].value === "number");
-  const [at] = numbers;
-  const axisOf = (one) => ({
-    label: title(memberName(pointerOf(one))),
-    unit: unitOf(one) ?? "1",
-  });
+  const isMap = numbers.length === 2 && variables.length === 2;
+  const [across, up] = numbers;
+  const known = history.filter(({ objectives: [value] }) => Number.isFinite(value));
+  const levels = levelsOf(...(extentOfValues(known.map((one) => one.objectives[0])) ?? [0, 0]), 7);
   const groups = useMemo(() => {
-    const named = ({ values }) =>
-      values
-        .filter(({ value }) => typeof value !== "number")
-        .map(({ value }) => valueText(value))
-        .join(", ");
-    return [...Map.groupBy(history, (one) => named(one) || "candidates")].slice(0, 8);
+    const named = ({ values, objectives: [value] }) =>
+      isMap
+        ? levels.findLastIndex((level) => level <= value)
+        : values
+            .filter((one) => typeof one.value !== "number")
+            .map((one) => valueText(one.value))
+            .join(", ") || "candidates";
+    return [...Map.groupBy(known, named)].slice(0, 8);
   }, [history]);
   if (numbers.length === 0) return null;
-  if (numbers.length === 2 && variables.length === 2) {
-    const isBest = (values) =>
-      values.every((one, index) => one.value === best?.values[index].value);
-    const points = history.map(({ values, objectives: [value] }) => ({
-      at: values.map((one) => one.value),
-      value,
-      isBest: isBest(values),
-    }));
-    return html`<${SearchMap}
-      title="The search"
-      label=${label}
-      unit=${unit}
-      axes=${variables.map(axisOf)}
-      points=${points}
-    />`;
-  }
-  const series = groups.map(([label, rows], index) => ({
+  const colorOf = (at) => shade(0.2 + (0.8 * at) / Math.max(1, levels.length - 1)); // also on a dark ground
+  if (isMap) groups.sort(([a], [b]) => b - a); // the best ones above
+  const series = groups.map(([group, rows], index) => ({
     kind: "points",
-    size: 7,
-    label,
-    color: `c${index + 1}`,
-    x: rows.map(({ values }) => values[at].value),
-    y: rows.map(({ objectives }) => objectives[0] ?? NaN),
+    size: isMap ? 10 : 7,
+    label: isMap ? `from ${quantity(levels[group], unit, 3)}` : group,
+    color: isMap ? `level-${group}` : `c${index + 1}`,
+    x: rows.map(({ values }) => values[across].value),
+    y: rows.map((one) => (isMap ? one.values[up].value : one.objectives[0])),
+    notes: isMap && rows.map((one) => quantity(one.objectives[0], unit)),
   }));
-  const chosen = best?.values[at].value;
-  return html`<${Chart}
-    title="The search"
-    height=${260}
-    x=${axisOf(variables[at])}
-    y=${{ label, unit }}
-    series=${series}
-    rules=${chosen === undefined ? [] : [{ x: chosen, label: "best", color: "ok" }]}
-  />`;
+  const axisOf = (at) => ({
+    label: title(memberName(pointerOf(variables[at]))),
+    unit: unitOf(variables[at]) ?? "1",
+  });
+  const label = `${title(metric)} of every candidate`;
+  const y = isMap ? axisOf(up) : { label, unit };
+  const colors = levels.map((_, at) => [`--level-${at}`, colorOf(at)]);
+  const found = best?.values.map(({ value }) => value);
+  const rules = found
+    ? [{ x: found[across], label: "best", color: "ok" }, isMap && { y: found[up], color: "ok" }]
+    : [];
+  return html`<div style=${Object.fromEntries(colors)}>
+    <${Chart}
+      title="The search"
+      heading=${isMap ? label : null}
+      height=${260}
+      x=${axisOf(across)}
+      y=${y}
+      series=${series}
+      rules=${rules.filter(Boolean)}
+    >
+      ${isMap ? (plot) => html`<${UpwardTitle} axis=${y} plot=${plot} />` : null}
+    <//>
+  </div>`;
 }
 
 function Front({ study: { front, objectives, best }, units, values }) {
