@@ -61,8 +61,11 @@ function logTicks([low, high], most) {
   return ticks.filter((value) => value >= low * 0.999999 && value <= high * 1.000001);
 }
 
-export const ticksOf = (scale, most) =>
-  scale.isLog ? logTicks(scale.domain, most) : linearTicks(scale.domain, most);
+// At least two where there can be.
+export function ticksOf(scale, most) {
+  const ticks = (scale.isLog ? logTicks : linearTicks)(scale.domain, most);
+  return ticks.length < 2 && most < 20 ? ticksOf(scale, 2 * most) : ticks;
+}
 
 // [least, largest] of the numbers in arrays, of positive ones only where `isLog`; null where there are none.
 export function extentOf(arrays, isLog = false) {

@@ -9,7 +9,7 @@ import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
-import { Decision, SceneLink, between, memberName, sentence } from "./parts.js";
+import { Decision, SceneLink, between, memberName, remarksOf, sentence } from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 const isKnown = { true: "yes", false: "no" };
@@ -32,7 +32,7 @@ export function CalibrateStudy() {
     shift !== 0 &&
       shift !== null &&
       `The measurement begins ${quantity(shift, "s")} later than the scene.`,
-    ...study.warnings.map(({ detail: text }) => sentence(text)),
+    ...remarksOf(study),
   ];
   // Materials whose numbers were fitted: each can have them as its next revision.
   const isOfBuffer = parameters.some((one) => /restitution|contact_time/.test(pointerOf(one)));

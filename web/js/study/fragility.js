@@ -6,7 +6,7 @@ import { useResult } from "../result/context.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Decision, between, sentence } from "./parts.js";
+import { Decision, between, remarksOf } from "./parts.js";
 
 const STEPS = 200;
 
@@ -89,7 +89,7 @@ export function FragilityStudy() {
   const remarks = [
     hasFit &&
       `Dispersion ${number(limit.dispersion, 3)} (95 %: ${between(...limit.dispersion_interval_95, "")}); ${limit.exceeded} of ${curves.length} records exceed the limit within the levels.`,
-    ...study.warnings.map(({ detail }) => sentence(detail)),
+    ...remarksOf(study),
   ];
   return html`<${Decision} more=${remarks}>${answer}<//>
     <div class="row">

@@ -12,7 +12,7 @@ import { Table } from "../ui/table.js";
 import { quantity, title, words } from "../units.js";
 import { Bars } from "./bars.js";
 import { UpwardTitle, levelsOf, shade } from "./contours.js";
-import { Decision, SceneLink, between, extentOfValues, memberName, sentence } from "./parts.js";
+import { Decision, SceneLink, between, extentOfValues, memberName, remarksOf } from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 
@@ -27,10 +27,7 @@ export function OptimizeStudy() {
       .join(", ");
   const { best, objectives, front, region, rivals, candidates, runs } = study;
   const [goal] = objectives;
-  const remarks = [
-    `${candidates} candidates, ${runs} runs.`,
-    ...study.warnings.map(({ detail }) => sentence(detail)),
-  ];
+  const remarks = [`${candidates} candidates, ${runs} runs.`, ...remarksOf(study)];
   const use = html`<${SceneLink}
     className="button primary"
     label="Run the scene with these values"

@@ -17,6 +17,14 @@ export const sentence = (clause) =>
     .replace(/^(\/\S+):/, (_, pointer) => memberName(pointer))
     .replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase())}.`;
 
+// What the service remarks on a study, a sentence each; one without a subject is about the member that it points at.
+export const remarksOf = ({ warnings }) =>
+  warnings.map(({ pointer, detail }) =>
+    sentence(
+      /^(may|is|has) /.test(detail) ? `${words(pointer.split("/").at(-1))} ${detail}` : detail,
+    ),
+  );
+
 export const between = (low, high, unit) =>
   `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
 

@@ -7,7 +7,7 @@ import { share } from "../result/headlines.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { quantity, title } from "../units.js";
-import { Decision, memberName, sentence } from "./parts.js";
+import { Decision, memberName, remarksOf } from "./parts.js";
 
 const STABLE = { true: "yes", false: "no" };
 const METRICS = ["peak_displacement", "rms_displacement"];
@@ -123,10 +123,7 @@ export function ResponseStudy() {
     irregular > 0 && `${irregular} of ${points.length} points have no period.`,
     unstable > 0 && `${unstable} motions are unstable: none of them lasts.`,
   ];
-  const facts = [
-    counts.filter(Boolean).join(" "),
-    ...study.warnings.map(({ detail }) => sentence(detail)),
-  ];
+  const facts = [counts.filter(Boolean).join(" "), ...remarksOf(study)];
   return html`<${Decision} more=${facts}>${decisionOf(points, name, unit)}<//>
     <div class="row">
       <${Choice}

@@ -15,7 +15,7 @@ export function Point({ answer, model, chosen, best, sceneOf, pick, isDrawn }) {
     if (!isDrawn) return null;
     const first = best >= 0 ? best : 0;
     return html`<p class="hint">
-      ${"A click on the chart opens a point. "}
+      ${"A click on the chart, or arrow keys and Enter, opens a point. "}
       <button type="button" class="link" onClick=${() => pick(first)}>
         ${best >= 0 ? "Open the best one" : "Open the first one"}
       </button>
