@@ -27,7 +27,7 @@ const tickText = (value, factor, isLog) =>
     ? number(value / factor, 2).replace(/^1 × /, "")
     : number(Number((value / factor).toPrecision(9)), 9);
 
-const GLYPH = 6.2; // px, a letter of an axis' texts
+const GLYPH = 5.8; // px, a letter of an axis' texts
 export const textWidth = (text) => GLYPH * text.length;
 
 // A name in one line, or in two where it is wider than `room`.
@@ -39,11 +39,20 @@ export function linesOf(text, room) {
   return at ? [text.slice(0, at), text.slice(at + 1)] : [text];
 }
 
-const Name = ({ x, y, text, room }) => {
-  const lines = linesOf(text, room);
-  return html`<text y=${y + 10 - 6 * lines.length} text-anchor="end">
+// The names of categories along an axis: {lines: of each, room: what the widest one needs}.
+export function namesAlong({ categories }, width) {
+  const lines = categories.map((text) => linesOf(text, width / categories.length - 2));
+  return { lines, room: Math.max(...lines.flat().map(textWidth)) + 2 };
+}
+
+const Lines = ({ x, y, lines, anchor }) =>
+  html`<text y=${y} text-anchor=${anchor}>
     ${lines.map((line, at) => html`<tspan x=${x} dy=${at > 0 ? 12 : 0}>${line}</tspan>`)}
   </text>`;
+
+const Name = ({ x, y, text, room }) => {
+  const lines = linesOf(text, room);
+  return html`<${Lines} x=${x} y=${y + 10 - 6 * lines.length} lines=${lines} anchor="end" />`;
 };
 
 // Round numbers in the axis' unit; a category axis has `categories`: texts at 0, 1, 2, …
@@ -59,20 +68,16 @@ function ticksFor(axis, scale, factor, most) {
 export function XAxis({ axis, scale, top, bottom, isCompact }) {
   const [left, right] = scale.pixels;
   const { factor } = axisUnit(axis, scale.domain);
-  const ticks = ticksFor(
-    axis,
-    scale,
-    factor,
-    Math.max(2, (right - left) / (axis.categories ? 90 : 80)),
-  );
+  const names = axis.categories && namesAlong(axis, right - left);
+  const ticks = ticksFor(axis, scale, factor, Math.max(2, (right - left) / (names?.room ?? 80)));
   return html`<g class="axis">
     ${ticks.map((value) => {
       const x = Math.round(scale.to(value)) + 0.5;
-      const text = axis.categories ? axis.categories[value] : tickText(value, factor, axis.log);
-      const middle = Math.min(x, right + 14 - textWidth(text) / 2); // none is cut off
+      const lines = names?.lines[value] ?? [tickText(value, factor, axis.log)];
+      const middle = Math.min(x, right + 14 - Math.max(...lines.map(textWidth)) / 2); // none is cut off
       return html`<g>
         <line x1=${x} x2=${x} y1=${top} y2=${bottom} class="grid" />
-        ${!isCompact && html`<text x=${middle} y=${bottom + 15} text-anchor="middle">${text}</text>`}
+        ${!isCompact && html`<${Lines} x=${middle} y=${bottom + 15} lines=${lines} anchor="middle" />`}
       </g>`;
     })}
     <line x1=${left} x2=${right} y1=${bottom + 0.5} y2=${bottom + 0.5} class="frame" />

@@ -17,6 +17,7 @@ export function Spans({ spans, plot }) {
 }
 
 const LINE = 14; // px
+const PLACES = 40; // along a level rule that are tried
 
 // Where the labels of upright rules stand above the plot, none over another: {height, places: Map of rules to {line, start}}.
 export function uprightLabels(rules, x) {
@@ -38,21 +39,26 @@ export function uprightLabels(rules, x) {
 }
 
 // Whether a series is where a label of this width at (x, y) would stand.
-const isBehind = (one, plot, x, y, width) => {
-  const values = [0, 0.2, 0.4, 0.6, 0.8, 1].flatMap((part) => {
-    const at = nearestIndex(one, plot.x.from(x + part * width));
-    return one.low ? [one.low[at], one.high[at]] : [one.y[at]];
+function isBehind(one, plot, x, y, width) {
+  const places = [0, 0.2, 0.4, 0.6, 0.8, 1].flatMap((part) => {
+    const across = plot.x.from(x + part * width);
+    const at = nearestIndex(one, across);
+    const values = one.low ? [one.low[at], one.high[at]] : [one.y[at]];
+    const pixels = values.filter(Number.isFinite).map(plot.y.to);
+    if (one.kind !== "bars") return pixels;
+    return Math.abs(across - one.x[at]) < (one.width[at] ?? one.width) / 2
+      ? [...pixels, plot.bottom]
+      : [];
   });
-  const places = values.filter(Number.isFinite).map(plot.y.to);
-  if (one.kind === "bars") places.push(plot.bottom);
   return Math.min(...places) < y + 6 && Math.max(...places) > y - 14;
-};
+}
 
-// A level rule has its label where no series is: at the right, the left or in the middle, above or below.
+// A level rule has its label where no series is, as far at the right as can be, above or below.
 function levelPlace(at, label, plot, series) {
   const { left, right, top, bottom } = plot;
   const width = textWidth(label);
-  const places = [right - 4 - width, left + 4, (left + right - width) / 2]
+  const step = (right - left - width - 8) / PLACES;
+  const places = Array.from({ length: PLACES + 1 }, (_, index) => right - 4 - width - index * step)
     .flatMap((x) => [at - 5, at + 14].map((y) => ({ x, y })))
     .filter(({ y }) => y - 12 > top && y < bottom);
   const isFree = ({ x, y }) => !series.some((one) => isBehind(one, plot, x, y, width));

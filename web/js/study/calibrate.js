@@ -8,10 +8,19 @@ import { useResult } from "../result/context.js";
 import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Bars } from "./bars.js";
-import { Decision, SceneLink, between, memberName, remarksOf, sentence } from "./parts.js";
+import {
+  Bars,
+  Decision,
+  SceneLink,
+  between,
+  memberName,
+  quantities,
+  remarksOf,
+  sentence,
+} from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
+const unitOf = ({ unit }) => unit;
 const isKnown = { true: "yes", false: "no" };
 
 // "25 ± 0.03 ms"
@@ -109,18 +118,8 @@ function Intervals({ parameters }) {
 function Parameters({ parameters }) {
   const columns = [
     { label: "Parameter", value: (one) => title(memberName(pointerOf(one))) },
-    {
-      label: "Value",
-      isNumeric: true,
-      value: ({ value }) => value,
-      cell: (one) => quantity(one.value, one.unit),
-    },
-    {
-      label: "Standard error",
-      isNumeric: true,
-      value: (one) => one.standard_error,
-      cell: (one) => quantity(one.standard_error, one.unit, 3),
-    },
+    quantities("Value", ({ value }) => value, unitOf),
+    quantities("Standard error", (one) => one.standard_error, unitOf, 3),
     {
       label: "95 %",
       value: ({ interval_95: interval, unit }) => (interval ? between(...interval, unit) : null),
@@ -133,30 +132,15 @@ function Parameters({ parameters }) {
 function Residuals({ residuals }) {
   const columns = [
     { label: "Channel", value: ({ channel }) => title(channel) },
-    {
-      label: "RMS of what is left",
-      isNumeric: true,
-      value: ({ value }) => value,
-      cell: (one) => quantity(one.value, one.unit, 3),
-    },
-    {
-      label: "Measured RMS",
-      isNumeric: true,
-      value: (one) => one.measured_rms,
-      cell: (one) => quantity(one.measured_rms, one.unit, 3),
-    },
+    quantities("RMS of what is left", ({ value }) => value, unitOf, 3),
+    quantities("Measured RMS", (one) => one.measured_rms, unitOf, 3),
     {
       label: "Part",
       isNumeric: true,
       value: (one) => one.value / one.measured_rms,
       cell: (one) => share(one.value / one.measured_rms, 3),
     },
-    {
-      label: "Stated noise",
-      isNumeric: true,
-      value: ({ deviation }) => deviation,
-      cell: (one) => (one.deviation === null ? "–" : quantity(one.deviation, one.unit, 3)),
-    },
+    quantities("Stated noise", ({ deviation }) => deviation, unitOf, 3),
     { label: "Samples", isNumeric: true, value: ({ samples }) => number(samples, 9) },
   ];
   return html`<${Table} caption="Residuals" columns=${columns} rows=${residuals} />`;

@@ -8,8 +8,7 @@ import { bandLine } from "../runs/bands.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { capital, number, quantity, title, words } from "../units.js";
-import { Bars } from "./bars.js";
-import { Decision, sentence } from "./parts.js";
+import { Bars, Decision, sentence } from "./parts.js";
 
 const MOST_NAMED = 3; // in a sentence
 const PROPER = /^(hertz|hunt crossley|lankarani nikravesh|flores|jankowski)/;

@@ -6,8 +6,7 @@ import { useResult } from "../result/context.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Bars } from "./bars.js";
-import { Decision, SceneLink, between, memberName, plainScene } from "./parts.js";
+import { Bars, Decision, SceneLink, between, memberName, plainScene, quantities } from "./parts.js";
 
 // Bins by the rule of Freedman and Diaconis, at least as many as that of Sturges.
 export function histogram(values) {
@@ -194,12 +193,12 @@ function Numbers({ statistics, known, scene, inputs, runs }) {
     ...plainScene(scene),
     excitation: { ...scene.excitation, seed },
   });
-  const of = (key) => ({
-    label: title(key),
-    isNumeric: true,
-    value: (row) => row[key],
-    cell: (row) => quantity(row[key], row.unit),
-  });
+  const of = (key) =>
+    quantities(
+      title(key),
+      (row) => row[key],
+      ({ unit }) => unit,
+    );
   const columns = [
     { label: "Metric", value: ({ metric }) => title(metric) },
     of("mean"),

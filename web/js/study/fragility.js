@@ -6,7 +6,7 @@ import { useResult } from "../result/context.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Decision, between, remarksOf } from "./parts.js";
+import { Decision, between, quantities, remarksOf } from "./parts.js";
 
 const STEPS = 200;
 
@@ -163,12 +163,7 @@ function Records({ curves, fractiles, limit, unit, measure }) {
 function Limits({ limits, unitOf }) {
   const columns = [
     { label: "Metric", value: ({ metric }) => title(metric) },
-    {
-      label: "Limit",
-      isNumeric: true,
-      value: ({ value }) => value,
-      cell: (one) => quantity(one.value, unitOf(one)),
-    },
+    quantities("Limit", ({ value }) => value, unitOf),
     { label: "Median", unit: "m/s^2", value: ({ median }) => median },
     {
       label: "95 % of the median",

@@ -10,9 +10,17 @@ import { unitAt } from "../scene/inputs.js";
 import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { quantity, title, words } from "../units.js";
-import { Bars } from "./bars.js";
 import { UpwardTitle, levelsOf, shade } from "./contours.js";
-import { Decision, SceneLink, between, extentOfValues, memberName, remarksOf } from "./parts.js";
+import {
+  Bars,
+  Decision,
+  SceneLink,
+  between,
+  extentOfValues,
+  memberName,
+  quantities,
+  remarksOf,
+} from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 
@@ -86,12 +94,12 @@ function Gain({ study: { best, given, undamped }, units }) {
         text: quantity(of[metric], units[metric], 3),
       })),
     );
-  const of = (label, source) => ({
-    label,
-    isNumeric: true,
-    value: (metric) => source?.metrics[metric],
-    cell: (metric) => quantity(source?.metrics[metric], units[metric]),
-  });
+  const of = (label, source) =>
+    quantities(
+      label,
+      (metric) => source?.metrics[metric],
+      (metric) => units[metric],
+    );
   const columns = [
     { label: "Metric", value: title },
     of("Best", best),
@@ -215,18 +223,8 @@ function Front({ study: { front, objectives, best }, units, values }) {
 function Region({ region, unitOf }) {
   const columns = [
     { label: "Member", value: (one) => title(memberName(pointerOf(one))) },
-    {
-      label: "From",
-      isNumeric: true,
-      value: ({ low }) => low,
-      cell: (one) => quantity(one.low, unitOf(one)),
-    },
-    {
-      label: "To",
-      isNumeric: true,
-      value: ({ high }) => high,
-      cell: (one) => quantity(one.high, unitOf(one)),
-    },
+    quantities("From", ({ low }) => low, unitOf),
+    quantities("To", ({ high }) => high, unitOf),
   ];
   const rows = region.filter(({ low }) => low !== null);
   return html`<h3>Within 2 % of the best</h3>

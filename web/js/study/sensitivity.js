@@ -7,9 +7,9 @@ import { share } from "../result/headlines.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Bars } from "./bars.js";
-import { Decision, between } from "./parts.js";
+import { Bars, Decision, between, quantities } from "./parts.js";
 
+const unitOf = ({ unit }) => unit;
 const NAMES = { restitution: "restitution e", contact_time: "contact time", mass: "free mass" };
 const nameOf = (parameter) => NAMES[parameter] ?? words(parameter);
 
@@ -89,18 +89,8 @@ function Tornado({ response, metric }) {
 function Spread({ statistics, made, errors }) {
   const columns = [
     { label: "Metric", value: (row) => title(row.metric) },
-    {
-      label: "As stated",
-      isNumeric: true,
-      value: (row) => row.value,
-      cell: (row) => quantity(row.value, row.unit),
-    },
-    {
-      label: "Median",
-      isNumeric: true,
-      value: (row) => row.median,
-      cell: (row) => quantity(row.median, row.unit),
-    },
+    quantities("As stated", ({ value }) => value, unitOf),
+    quantities("Median", ({ median }) => median, unitOf),
     { label: "5 to 95 %", value: (row) => between(row.q05, row.q95, row.unit) },
     {
       label: "Width",
