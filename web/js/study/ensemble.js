@@ -104,8 +104,10 @@ function Distribution({ study, metric, given, shape }) {
   const rules = [
     { x: one.mean, label: "mean", color: "text" },
     Number.isFinite(given) && { x: given, label: "the scene itself", color: "ghost" },
+    { x: one.q05, label: "5 %", color: "quiet" },
+    { x: one.q95, label: "95 %", color: "quiet" },
   ].filter(Boolean);
-  const spans = [{ from: one.q05, to: one.q95, label: "90 of 100" }];
+  const spans = [{ from: one.q05, to: one.q95 }];
   return html`<${Chart}
     title=${`Distribution of the ${words(metric)}`}
     heading=${isCumulative ? "Part of the runs at or below" : "Number of runs"}
