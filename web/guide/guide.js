@@ -1,7 +1,7 @@
 // What the guide's pages do beyond HTML: the theme, copying code, the heading in sight, and the search.
 import { get } from "../web/js/api.js";
 import { themed } from "../web/js/theme.js";
-import { CopyButton } from "../web/js/ui/controls.js";
+import { CopyButton, Notice } from "../web/js/ui/controls.js";
 import { html, render } from "../web/js/ui/preact.js";
 
 const MOST = 12; // results
@@ -50,6 +50,20 @@ const list = at("guide-pages");
 const here = list.querySelector("[aria-current]");
 if (here && here.offsetTop > list.clientHeight - 60)
   list.scrollTop = here.offsetTop - list.clientHeight / 2;
+
+// At a wrong address the service sends the first page.
+if (here.pathname !== location.pathname && !/\/index.html$/.test(location.pathname)) {
+  const box = document.createElement("div");
+  at("guide-main").prepend(box);
+  const sentence =
+    "The link is wrong or old. This is the first page; the search and the list of pages lead on.";
+  render(
+    html`<${Notice} kind="warn" title="The guide has no page at this address"
+      ><p>${sentence}</p><//
+    >`,
+    box,
+  );
+}
 
 // The search. The index is read when the field gets the focus: [[page, title, [[anchor, heading, text] ...]] ...].
 const words = at("guide-words");

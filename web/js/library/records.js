@@ -16,8 +16,8 @@ const COLUMNS = [
     value: (row) => row.name,
     cell: (row) => html`<a href=${link(`records/${row.name}`)}>${row.name}</a>`,
   },
-  { label: "Earthquake", value: (row) => row.earthquake },
-  { label: "Station", value: (row) => row.station },
+  { label: "Earthquake", isOptional: true, value: (row) => row.earthquake },
+  { label: "Station", isOptional: true, value: (row) => row.station },
   { label: "Duration", unit: "s", value: (row) => row.duration },
   { label: "Peak acceleration", unit: "m/s^2", digits: 3, value: (row) => row.peak },
   { label: "Peak velocity", unit: "m/s", digits: 3, value: (row) => row.peak_velocity },
@@ -62,7 +62,7 @@ function FileField({ pointer, label, draft }) {
       aria-describedby=${`${id.current}-hint`}
       onChange=${choose}
     />
-    <p class="hint" id=${`${id.current}-hint`}>
+    <p class="hint at-value" id=${`${id.current}-hint`}>
       PEER's AT2, times with accelerations, or one column
     </p>
   </div>`;
@@ -88,11 +88,11 @@ function RecordsPage() {
         ${({ records }) => html`
           <${Table}
             caption="Records"
-            columns=${COLUMNS}
+            columns=${COLUMNS.filter(({ isOptional, value }) => !isOptional || records.some(value))}
             rows=${records}
             keyOf=${(row) => row.name}
             filter=${records.length > 8 ? "Filter by words" : null}
-            empty="There are none yet."
+            empty="There are none yet. Upload one below; a scene names it as its base motion."
           />
           ${records.length === LIMIT && html`<p class="hint">${`The first ${LIMIT} by name.`}</p>`}
         `}
