@@ -95,3 +95,12 @@ test("Light or dark is one choice for the dashboard and the guide", async ({ pag
   await page.waitForURL(/studies\.html#cost-and-limits$/);
   assert.ok(await page.getByRole("heading", { name: "Cost and limits" }).isVisible());
 });
+
+test("A wrong address of the guide is named above its first page", async ({ page, url, refused }) => {
+  refused(404);
+  await page.goto(url("guide/nothing.html"));
+  await says(page.getByRole("main"), /no page at this address.*Start/s);
+  await page.goto(url("guide/concepts.html"));
+  await says(page.getByRole("main"), /Concepts/);
+  assert.equal(await page.locator(".notice").count(), 0);
+});

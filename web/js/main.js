@@ -95,7 +95,10 @@ async function open(address, signal, isNext) {
   try {
     const name = nameOf(address.path);
     if (!Object.hasOwn(pages, name) || !address.path.join("/").match(ADDRESSES))
-      throw new Error(`There is no page "${address.path.join("/")}" here.`);
+      throw {
+        title: "No such page",
+        detail: `There is no page "${address.path.join("/")}" here. The links above lead to all pages.`,
+      };
     if (Object.hasOwn(FIRST, name)) askAhead(FIRST[name](address.path));
     const { page } = await pages[name]();
     if (signal.aborted) return null;

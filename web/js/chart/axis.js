@@ -74,7 +74,7 @@ export function XAxis({ axis, scale, top, bottom, isCompact }) {
     ${ticks.map((value) => {
       const x = Math.round(scale.to(value)) + 0.5;
       const lines = names?.lines[value] ?? [tickText(value, factor, axis.log)];
-      const middle = Math.min(x, right + 14 - Math.max(...lines.map(textWidth)) / 2); // none is cut off
+      const middle = Math.min(x, right + 10 - Math.max(...lines.map(textWidth)) / 2); // none is cut off
       return html`<g>
         <line x1=${x} x2=${x} y1=${top} y2=${bottom} class="grid" />
         ${!isCompact && html`<${Lines} x=${middle} y=${bottom + 15} lines=${lines} anchor="middle" />`}

@@ -181,7 +181,7 @@ function DropTestPage({ address: { path: parts, query }, signal }) {
     },
     [slug, measurement],
   );
-  return html`<${Loaded} loaded=${loaded}>
+  return html`<${Loaded} loaded=${loaded} heading=${`Drop test of ${slug}`}>
     ${({ material, schema }) =>
       html`<h1>
           ${calibration ? "Calibration of" : "Drop test of"}${" "}<a

@@ -273,7 +273,7 @@ function MaterialPage({ address, signal }) {
     [address], // a change leads to its revision, which may be the same one
   );
   const current = loaded.data?.material;
-  return html`<${Loaded} loaded=${loaded}>
+  return html`<${Loaded} loaded=${loaded} heading=${slug}>
     ${(data) => html`<${Material} key=${`${current.etag}@${current.revision}`} ...${data} />`}
   <//>`;
 }

@@ -2,7 +2,7 @@
 import { note, read } from "../address.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { Choice, Loaded, Panel } from "../ui/controls.js";
+import { Choice, Loaded, Panel, sentence, withSubscripts } from "../ui/controls.js";
 import { freshId } from "../ui/ids.js";
 import { html, useMemo, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
@@ -111,7 +111,7 @@ function Pair({ pair }) {
     ${
       pair.warnings.length > 0 &&
       html`<ul class="remarks hint">
-        ${pair.warnings.map(({ detail }) => html`<li>${detail}</li>`)}
+        ${pair.warnings.map(({ detail }) => html`<li>${withSubscripts(sentence(detail))}</li>`)}
       </ul>`
     }`;
 }

@@ -130,7 +130,7 @@ function Spectrum({ name, query }) {
         return html`<${Chart}
           title=${`${chosen.label} of oscillators`}
           height=${200}
-          x=${{ label: "Period", unit: "s", log: true }}
+          x=${{ label: "Period [s]", unit: "1", log: true }}
           y=${{ label: chosen.label, unit, log: true }}
           series=${[{ label: chosen.label, color: chosen.color, x: data.period.values, y: values }]}
         />`;
@@ -199,7 +199,7 @@ function Record({ record, query }) {
 function RecordPage({ address: { path: parts, query } }) {
   const name = parts[1];
   const loaded = useLoaded((signal) => get(pathOf(name), null, signal), [name]);
-  return html`<${Loaded} loaded=${loaded}>
+  return html`<${Loaded} loaded=${loaded} heading=${name}>
     ${(record) => html`<${Record} key=${JSON.stringify(query)} record=${record} query=${query} />`}
   <//>`;
 }

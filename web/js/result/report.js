@@ -2,7 +2,7 @@
 import { html } from "../ui/preact.js";
 import { link } from "../address.js";
 import { get, schema as schemaNamed } from "../api.js";
-import { Button, Loaded } from "../ui/controls.js";
+import { Button, Loaded, sentence, withSubscripts } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
 import { Table } from "../ui/table.js";
@@ -81,7 +81,7 @@ function Report({ result, job, jobs, version, schema, View, signal }) {
   const { study } = result;
   const { study: asked, ...scene } = result.scene;
   const { warnings, links } = result;
-  const remarks = warnings.map(({ detail }) => html`<li>${detail}</li>`);
+  const remarks = warnings.map(({ detail }) => html`<li>${withSubscripts(sentence(detail))}</li>`);
   return html`<${ResultContext.Provider} value=${context}>
     <h1>${job?.title ?? "Result"}</h1>
     <p class="quiet">
@@ -122,7 +122,7 @@ function ReportPage({ address, signal }) {
       <${Button} isPrimary onClick=${() => print()}>Print or save as PDF<//>
       <a class="button" href=${link(`results/${id}`)}>Back to the result</a>
     </div>
-    <${Loaded} loaded=${loaded}>${show}<//>
+    <${Loaded} loaded=${loaded} heading="Report">${show}<//>
   </div>`;
 }
 

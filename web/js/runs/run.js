@@ -88,7 +88,7 @@ function Run({ first, path, signal }) {
 function RunPage({ address: { path: parts }, signal }) {
   const path = `v1/jobs/${encodeURIComponent(parts[1])}`;
   const loaded = useLoaded((own) => get(path, null, own), [path]);
-  return html`<${Loaded} loaded=${loaded}>
+  return html`<${Loaded} loaded=${loaded} heading="Run">
     ${(job) => html`<${Run} first=${job} path=${path} signal=${signal} />`}
   <//>`;
 }

@@ -1,8 +1,10 @@
 // Small parts of pages: buttons, notices, panels, tabs, menus, headline numbers.
 import { hints, places } from "../help.js";
 import { html, useLayoutEffect, useRef, useState } from "./preact.js";
+import { link, read } from "../address.js";
 import { reason } from "../api.js";
 import { announce } from "./announce.js";
+import { capital } from "../units.js";
 import { freshId } from "./ids.js";
 
 // A button that is not pressed again while what it did goes on; what fails is shown behind it.
@@ -78,6 +80,8 @@ export const Notice = ({ kind = "info", title, children }) =>
     <strong>${title}</strong>${children}
   </div>`;
 
+export const sentence = (text) => capital(text).replace(/(?<![.!?])$/, ".");
+
 const faultPlace = ({ pointer, row, column }) => (row ? `row ${row}, ${column}` : pointer);
 export const faultText = ({ detail, did_you_mean: meant }) =>
   `${detail}${meant ? ` (did you mean "${meant}"?)` : ""}`;
@@ -91,17 +95,35 @@ export const Failure = ({ error, onRetry }) => {
         ? html`<ul>
             ${errors.map((fault) => html`<li><code>${faultPlace(fault)}</code> ${faultText(fault)}</li>`)}
           </ul>`
-        : html`<p>${message ?? detail}</p>`
+        : html`<p>${sentence(message ?? detail ?? title)}</p>`
     }
     ${status === 0 && onRetry && html`<p><${Button} onClick=${onRetry}>Try again<//></p>`}
   <//>`;
 };
 
-// What waits for `loaded` ({data, error, isLoading} of useLoaded) before it shows anything.
-export function Loaded({ loaded, children }) {
-  if (loaded.error) return html`<${Failure} error=${loaded.error} onRetry=${loaded.retry} />`;
-  if (loaded.data === null) return html`<p class="quiet">Loading …</p>`;
-  return children(loaded.data);
+const LISTS = { materials: "All materials", records: "All ground motions", jobs: "All runs" };
+
+// Where a page of something that is not there leads on to.
+function ListLink() {
+  const [first] = read().path;
+  const name = first === "results" ? "jobs" : first;
+  return LISTS[name] && html`<p><a href=${link(name)}>${LISTS[name]}</a></p>`;
+}
+
+// What waits for `loaded` ({data, error, isLoading, retry} of useLoaded) before it shows anything; a whole page has a `heading`
+// until then.
+export function Loaded({ loaded, heading, children }) {
+  const { data, error, retry } = loaded;
+  if (data !== null) return children(data);
+  return html`${heading && html`<h1>${heading}</h1>`}
+  ${
+    error
+      ? html`<${Failure}
+            error=${error}
+            onRetry=${retry}
+          />${error.status === 404 && html`<${ListLink} />`}`
+      : html`<p class="quiet">Loading …</p>`
+  }`;
 }
 
 const guideLink = (place) => `guide/${place.replace(/#|$/, ".html$&")}`;
