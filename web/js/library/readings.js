@@ -1,9 +1,9 @@
 // What drop tests gave: e and T_c as headline numbers and as charts of all readings over the approach speed.
 import { Chart } from "../chart/chart.js";
 import { extentOf, paddedDomain } from "../chart/scale.js";
-import { Headlines } from "../ui/controls.js";
+import { Headlines, sentence } from "../ui/controls.js";
 import { html } from "../ui/preact.js";
-import { capital, quantity } from "../units.js";
+import { quantity } from "../units.js";
 import { QUANTITIES, range } from "./format.js";
 
 // e and T_c with their intervals: [{label, value, note}].
@@ -67,8 +67,6 @@ function seriesOf({ name, color }, rows, statistics, domain) {
     ),
   ].filter((series) => series && series.x.length > 0);
 }
-
-const sentence = (text) => `${capital(text).replaceAll("+-", "±")}.`;
 
 function ReadingsChart({ quantity: shown, evaluation, isSaid }) {
   const { name, label, unit } = shown;

@@ -80,7 +80,10 @@ export const Notice = ({ kind = "info", title, children }) =>
     <strong>${title}</strong>${children}
   </div>`;
 
-export const sentence = (text) => capital(text).replace(/(?<![.!?])$/, ".");
+export const sentence = (text) =>
+  capital(text)
+    .replaceAll("+-", "±")
+    .replace(/(?<![.!?])$/, ".");
 
 const faultPlace = ({ pointer, row, column }) => (row ? `row ${row}, ${column}` : pointer);
 export const faultText = ({ detail, did_you_mean: meant }) =>
