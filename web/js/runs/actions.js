@@ -51,7 +51,7 @@ function RenameForm({ row, onDone, onClose }) {
         ref=${input}
         size="40"
         maxlength="200"
-        defaultValue=${row.title ?? row.name}
+        defaultValue=${row.name}
         aria-invalid=${error !== null || null}
       />
     </label>
@@ -67,8 +67,11 @@ async function removeAll(rows) {
   announce(`Deleted: ${count(rows.length)}`);
 }
 
+const chosenText = (shown, hidden) =>
+  `${shown || "None"} chosen${hidden > 0 ? `, ${hidden} more hidden by the filter` : ""}`;
+
 // The bar is there before something is chosen, so that the table does not move.
-export function Actions({ rows, isAll, onAll, onNone, onDone }) {
+export function Actions({ rows, hidden, isAll, onAll, onNone, onDone }) {
   const [step, setStep] = useState(null); // "rename" or "delete", before it is done
   const isBusy = rows.some(isOpen);
   const isNone = rows.length === 0;
@@ -86,11 +89,11 @@ export function Actions({ rows, isAll, onAll, onNone, onDone }) {
       <${Button} isQuiet onClick=${close}>Keep<//>
     </div>`;
   return html`<div class="row" role="group" aria-label="Chosen runs">
-    <span class="quiet chosen-count">${isNone ? "None chosen" : `${rows.length} chosen`}</span>
+    <span class="quiet chosen-count">${chosenText(rows.length, hidden)}</span>
     <${CompareLink} rows=${rows} />
     <${Button} disabled=${rows.length !== 1} onClick=${() => setStep("rename")}>Rename<//>
     <${Button} disabled=${isNone || isBusy} onClick=${() => setStep("delete")}>Delete<//>
     ${!isAll && html`<${Button} isQuiet onClick=${onAll}>Choose all<//>`}
-    ${!isNone && html`<${Button} isQuiet onClick=${onNone}>Choose none<//>`}
+    ${rows.length + hidden > 0 && html`<${Button} isQuiet onClick=${onNone}>Choose none<//>`}
   </div>`;
 }

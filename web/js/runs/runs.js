@@ -102,10 +102,10 @@ function columnsOf(rows, schema, onCancel) {
       const numeric = { unit: unit ?? "1", digits: 4, value: of };
       return { key: pointer, label: title(label), ...(isNumeric ? numeric : { value: plain }) };
     });
-  const metrics = METRICS.map((metric) => ({
-    ...metric,
-    value: (row) => row.summary?.[metric.key] ?? null,
-  }));
+  const valueOf = (row, key) => row.summary?.[key] ?? null;
+  const metrics = METRICS.filter(({ key }) => rows.some((row) => valueOf(row, key) !== null)).map(
+    (metric) => ({ ...metric, value: (row) => valueOf(row, metric.key) }),
+  );
   const study = {
     key: "study",
     label: "Study",
@@ -116,35 +116,42 @@ function columnsOf(rows, schema, onCancel) {
     {
       key: "name",
       label: "Run",
-      value: (row) => row.name,
+      value: (row) => [row.name, row.detail].filter(Boolean).join(", "),
       cell: (row) => html`<${NameCell} row=${row} onCancel=${onCancel} />`,
     },
     ...(rows.some((row) => row.study) ? [study] : []),
     ...inputs,
     ...metrics,
+    ...(rows.every((row) => row.status === "successful") ? [] : [STATE]),
     {
       key: "created",
       label: "Submitted",
       value: (row) => row.created,
-      cell: (row) => html`<${StateCell} job=${row} />`,
+      cell: (row) => html`<span class="moment">${moment(row.created)}</span>`,
     },
   ];
 }
 
 // What is done as it should be catches no eye.
-const StateCell = ({ job }) =>
-  html`<span class="moment">${moment(job.created)}</span> ${
-      job.status !== "successful" && html`<${StateBadge} job=${job} />`
-    }`;
+const STATE = {
+  key: "state",
+  label: "State",
+  value: (row) => STATES[row.status],
+  cell: (row) =>
+    row.status === "successful"
+      ? html`<span class="quiet">${STATES[row.status]}</span>`
+      : html`<${StateBadge} job=${row} />`,
+};
 
 const NameCell = ({ row, onCancel }) =>
-  html`<a id=${row.id} href=${link(targetOf(row))}>${row.name}</a>
-    ${row.heading && html`<span class="hint subtitle">${row.heading}</span>`}
+  html`<a id=${row.id} href=${link(targetOf(row))}
+      >${row.name} ${row.detail && html`<span class="hint subtitle">${row.detail}</span>`}</a
+    >
     ${row.labels && html`<span class="hint subtitle">${row.labels.join(", ")}</span>`}
     ${isOpen(row) && html`<${Button} label=${`Cancel ${row.name}`} onClick=${() => onCancel(row)}>Cancel<//>`}`;
 
 const textOf = (row) =>
-  [row.name, row.heading, ...(row.labels ?? []), STATES[row.status], row.study, row.words]
+  [row.name, row.detail, ...(row.labels ?? []), STATES[row.status], row.study, row.words]
     .join("\n")
     .toLowerCase();
 
@@ -199,6 +206,7 @@ function orderOf(sort, columns) {
 function RunsTable({ rows, schema, query, change, chosen, setChosen, onToggle, onCancel, onDone }) {
   const columns = columnsOf(rows, schema, onCancel);
   const shown = matching(rows, query.q);
+  const chosenRows = shown.filter((row) => chosen.has(row.id)); // what is not seen is not acted on
   const setOrder = ({ column, direction }) =>
     change({ sort: `${direction < 0 ? "-" : ""}${columns[column].key}` });
   return html`<${Table}
@@ -208,8 +216,9 @@ function RunsTable({ rows, schema, query, change, chosen, setChosen, onToggle, o
     keyOf=${(row) => row.id}
     selection=${{ chosen, toggle: onToggle }}
     tools=${html`<${Actions}
-      rows=${rows.filter((row) => chosen.has(row.id))}
-      isAll=${shown.every((row) => chosen.has(row.id))}
+      rows=${chosenRows}
+      hidden=${chosen.size - chosenRows.length}
+      isAll=${chosenRows.length === shown.length}
       onAll=${() => setChosen(new Set(shown.map((row) => row.id)))}
       onNone=${() => setChosen(new Set())}
       onDone=${onDone}
@@ -261,10 +270,7 @@ function RunsPage() {
       <${Loaded} loaded=${loaded}>
         ${({ schema, next }) => {
           const names = namesOf(jobs, schema);
-          const rows = jobs.map((job) => {
-            const { name, title: heading } = names.get(job.id);
-            return { ...job, name, heading };
-          });
+          const rows = jobs.map((job) => ({ ...job, ...names.get(job.id) }));
           return html`<${RunsTable}
               rows=${rows}
               schema=${schema}

@@ -7,11 +7,17 @@ import { number, pretty, scale } from "../units.js";
 
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
 
+// The size that a column's unit suits: the largest, or the middle one where it is far below that.
+function readableSize(sizes, largest) {
+  const middle = sizes.filter(Boolean).sort((a, b) => a - b)[sizes.filter(Boolean).length >> 1];
+  return middle < largest / 100 ? middle : largest;
+}
+
 // How a column of numbers is written: its factor and unit, and as many decimals as show `digits` digits of the largest.
 export function columnFormat(values, unit, digits = 4) {
   const sizes = values.filter(isNumber).map(Math.abs);
   const largest = sizes.length > 0 ? Math.max(...sizes) : 0;
-  const [factor, shown] = scale(largest, unit);
+  const [factor, shown] = scale(readableSize(sizes, largest), unit);
   const size = largest / factor;
   const isWhole = values.every((value) => !isNumber(value) || Number.isInteger(value / factor));
   const isPlain = size === 0 || (size >= 1e-3 && size < 1e6);
