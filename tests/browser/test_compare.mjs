@@ -83,6 +83,7 @@ test("A result is added and taken out", async ({ page, daemon, url }) => {
   const [a, b] = await pair(daemon);
   await page.goto(url(`#/compare?a=${a}`));
   await page.getByRole("combobox", { name: "Add a result" }).selectOption(b);
+  await page.getByRole("button", { name: "Add it" }).click();
   await leads(page, new RegExp(`b=${b}`));
   await says(page.getByRole("main"), /70 times as hard/);
   await page.getByRole("button", { name: "Take B aluminium out" }).press("Enter");
@@ -99,6 +100,18 @@ test("What has no force of an impact is compared too: the impulse model, and a s
   await says(page.getByRole("figure", { name: "Over time", exact: true }), /A [^;]* between −12\.89 mm and 15 mm/);
 });
 
+test("Results that are the same are called so, and a frame's top storey is compared with a single mass", async ({ page, daemon, url }) => {
+  const [sponge] = await pair(daemon);
+  const frame = await daemon.run("frame_two_dampers", { duration: 5 });
+  await page.goto(url(`#/compare?a=${sponge}&b=${sponge}`));
+  await says(page.getByRole("main"), /The results are the same\.[^]*The motions differ by rounding at most\.[^]*The spectra do not differ\./);
+  await page.goto(url(`#/compare?a=${sponge}&b=${frame.result}`));
+  await says(page.getByRole("main"), /Of a frame the top storey is shown/);
+  const top = await daemon.get(`/v1/results/${frame.result}/series.json?channels=displacement_3`);
+  const largest = Math.max(...top.channels.displacement_3.values) * 1000;
+  await says(page.getByRole("figure", { name: "Over time", exact: true }), new RegExp(`and ${Math.floor(largest)}\\.`));
+});
+
 test("A result that is not there is named, and the page goes on", async ({ page, daemon, url, refused }) => {
   refused(404);
   const [a, b] = await pair(daemon);
@@ -106,5 +119,6 @@ test("A result that is not there is named, and the page goes on", async ({ page,
   await page.getByRole("alert").waitFor();
   await page.getByRole("button", { name: "Take B r-none out" }).click();
   await page.getByRole("combobox", { name: "Add a result" }).selectOption(b);
+  await page.getByRole("button", { name: "Add it" }).click();
   await says(page.getByRole("main"), /70 times as hard/);
 });

@@ -34,6 +34,7 @@ test("From the first sight to why the sponge beats aluminium: run, zoom to an im
   await page.getByRole("link", { name: "An earlier run …" }).click();
   await leads(page, new RegExp(`compare\\?a=${aluminium}`));
   await page.getByRole("combobox", { name: "Add a result" }).selectOption(sponge);
+  await page.getByRole("button", { name: "Add it" }).click();
   await leads(page, new RegExp(`b=${sponge}`));
   await says(main(page), /70[\d.]* times as/);
   await says(main(page), /Peak acceleration[\s\S]*0\.0331 ×/);

@@ -5,7 +5,7 @@ import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Loaded } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
-import { latest } from "./latest.js";
+import { latest } from "../runs/latest.js";
 import { number, pretty, words } from "../units.js";
 import { useResult } from "./context.js";
 
@@ -138,7 +138,7 @@ function SpectrumChart({ psd, names, ids, others }) {
       ${`${summary} Welch's method: ${psd.segments} segments of ${psd.segment} samples, window ${psd.window}.`}
     </p>
     <details open=${ids.length > 0}>
-      <summary>Lay other results over it</summary>
+      <summary>Overlay other results</summary>
       ${choices.map(
         ([id, label]) =>
           html`<div>

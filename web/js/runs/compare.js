@@ -1,14 +1,14 @@
 // Up to four results beside each other. In the address: a to d (results), and what comparison.js keeps there.
 import { go, link, note, read, swap } from "../address.js";
-import { follow, get, schema as schemaNamed, submit } from "../api.js";
+import { follow, get, submit } from "../api.js";
 import { Button, Failure, Help, IconButton, Loaded } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
-import { html, useEffect, useReducer } from "../ui/preact.js";
+import { html, useEffect, useReducer, useRef } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
-import { brief, moment } from "../units.js";
+import { brief } from "../units.js";
 import { idsOf, lettered, LETTERS, loadComparison } from "./compared.js";
 import { Comparison } from "./comparison.js";
-import { namesOf } from "./names.js";
+import { latest } from "./latest.js";
 
 const LATEST = 60;
 const PAIRS = [
@@ -19,21 +19,6 @@ const PAIRS = [
     examples: ["paper_free_sponge", "paper_free_impulse_sponge"],
   },
 ];
-
-// The latest results by their ids: {name, when}.
-async function loadLatest() {
-  const query = { status: "successful", kind: "none", limit: LATEST, details: 1 };
-  const [{ jobs }, schema] = await Promise.all([get("v1/jobs", query), schemaNamed("scene")]);
-  const there = jobs.filter((job) => job.result && !job.result_deleted);
-  const names = namesOf(there, schema);
-  const found = new Map();
-  for (const job of there) {
-    const { name, title } = names.get(job.id);
-    const text = title ? `${name} (${title})` : name;
-    if (!found.has(job.result)) found.set(job.result, `${text}, ${moment(job.finished)}`);
-  }
-  return found;
-}
 
 // Runs scenes to their ends; the ids of their results.
 async function runAll(scenes) {
@@ -55,10 +40,11 @@ const Pairs = () =>
     ${PAIRS.map(({ label, examples }) => html`<${Button} onClick=${() => runPair(examples)}>${label}<//>`)}
   </div>`;
 
-// The compared results, each with its colour, and a list to add one from.
+// The compared results, each with its colour, and a list with a button to add one.
 function Chosen({ ids, labels, names }) {
   // From the address: the page may not be drawn yet as it says.
   const set = (make) => go("compare", lettered(make(idsOf(read().query))));
+  const list = useRef(null);
   const others = [...names].filter(([id]) => !ids.includes(id));
   return html`<div class="compared">
     ${ids.map((id, at) => {
@@ -75,14 +61,15 @@ function Chosen({ ids, labels, names }) {
     })}
     ${
       ids.length < LETTERS.length &&
-      html`<select
-        aria-label="Add a result"
-        value=""
-        onChange=${({ currentTarget: { value } }) => set((now) => [...now, value])}
-      >
-        <option value="">${ids.length === 0 ? "Choose a result …" : "Add a result …"}</option>
-        ${others.map(([id, text]) => html`<option value=${id}>${text}</option>`)}
-      </select>`
+      others.length > 0 &&
+      html`<span class="add">
+        <select key=${ids.join()} aria-label="Add a result" ref=${list}>
+          ${others.map(([id, text]) => html`<option value=${id}>${text}</option>`)}
+        </select>
+        <${Button} label="Add it" onClick=${() => set((now) => [...now, list.current.value])}
+          >Add<//
+        >
+      </span>`
     }
   </div>`;
 }
@@ -91,7 +78,7 @@ function ComparePage({ address }) {
   const [, redraw] = useReducer((count) => count + 1, 0);
   const { query } = read();
   const ids = idsOf(query);
-  const latest = useLoaded(loadLatest, [ids.join()]);
+  const known = useLoaded(() => latest(LATEST), [ids.join()]);
   const loaded = useLoaded(
     (signal) => (ids.length > 1 ? loadComparison(ids, signal) : { runs: [] }),
     [ids.join()],
@@ -102,17 +89,17 @@ function ComparePage({ address }) {
   };
   // Without any named the last two are compared.
   useEffect(() => {
-    const [b, a] = latest.data?.keys() ?? [];
+    const [b, a] = known.data?.keys() ?? [];
     if (a && idsOf(read().query).length === 0) swap("compare", { a, b });
-  }, [latest.data, address]);
+  }, [known.data, address]);
   const isCurrent = !loaded.isLoading && loaded.data?.runs.length === ids.length;
   const labels = isCurrent ? loaded.data.runs.map(({ label }) => label) : [];
   return html`<div class="title-row">
       <h1>Compare</h1>
       <${Help} name="Compare" />
-      <${Chosen} ids=${ids} labels=${labels} names=${latest.data ?? new Map()} />
+      <${Chosen} ids=${ids} labels=${labels} names=${known.data ?? new Map()} />
     </div>
-    ${latest.error && html`<${Failure} error=${latest.error} />`}
+    ${known.error && html`<${Failure} error=${known.error} />`}
     ${
       ids.length < 2
         ? html`<section class="panel" aria-label="Begin">

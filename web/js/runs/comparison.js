@@ -4,10 +4,11 @@ import { html, useEffect, useMemo, useState } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Failure, Panel } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
-import { loadSeries, seriesOf, timeOfEnergy } from "../result/series.js";
-import { number, quantity, title, words } from "../units.js";
+import { loadSeries, MOST_SAMPLES, seriesOf, timeOfEnergy } from "../result/series.js";
+import { capital, number, quantity, title, words } from "../units.js";
 import { bandDifferences, bandSeries, furthestBand } from "./bands.js";
 import { ComparisonTable } from "./comparison_table.js";
+import { isSame } from "./scenes.js";
 
 const PIXELS = 1600; // buckets of a long series
 const QUIET_PART = 0.7; // motions that die before this part of the run are shown until then
@@ -49,16 +50,43 @@ function partingText([first, ...others], pairs) {
     : null;
 }
 
-function Lesson({ runs, pairs }) {
+function alikeText(runs, inputs) {
+  const isAlike = metricRows(runs).every(({ values }) =>
+    values.every((one) => isSame(one, values[0])),
+  );
+  if (!isAlike) return "They move alike: by less than 0.5 % of the rms displacement apart.";
+  return `The results are the same${inputs.length > 0 ? ", though their inputs differ" : ""}.`;
+}
+
+function Lesson({ runs, pairs, inputs }) {
   const [first, ...others] = runs;
-  const texts = [
+  const found = [
     ...others.map((other) => motionText(first, other)),
     runs.length === 2 && pushText(runs),
     partingText(runs, pairs),
   ].filter(Boolean);
+  const texts = found.length > 0 ? found : [alikeText(runs, inputs)];
   return html`<div class="decision">
     ${texts.map((text, at) => html`<p class=${at === 0 ? "answer" : null}>${text}</p>`)}
   </div>`;
+}
+
+// What is called "displacement" in all: a frame's is its top storey's. Undefined where there is none.
+const channelIn = (channels, channel) =>
+  channels.includes(channel)
+    ? channel
+    : channels.findLast(
+        (one) =>
+          /acceleration|^(displacement|velocity)/.test(one) && one.replace(/_\d+$/, "") === channel,
+      );
+
+// The channels that all have, else those of the top storeys.
+function commonChannels(runs) {
+  const lists = runs.map(({ result }) => result.channels);
+  const own = lists[0].filter((channel) => lists.every((list) => list.includes(channel)));
+  if (own.some((channel) => /^displacement/.test(channel))) return own;
+  const plain = [...new Set(lists[0].map((channel) => channel.replace(/_\d+$/, "")))];
+  return plain.filter((channel) => lists.every((list) => channelIn(list, channel)));
 }
 
 // b - a at a's samples; b lies between its own on a line.
@@ -76,9 +104,12 @@ function differenceOf(a, b) {
   return { x: a.time, y: difference };
 }
 
+const largestOf = (values) =>
+  values.reduce((most, value) => Math.max(most, Math.abs(value ?? 0)), 0);
+
 // The series of one channel of each run: [{run, time, column}].
 function useMotions(runs, channel, window) {
-  const isWhole = runs.every(({ result }) => result.count <= 50000);
+  const isWhole = runs.every(({ result }) => result.count <= MOST_SAMPLES);
   return useLoaded(
     (signal) =>
       Promise.all(
@@ -87,9 +118,10 @@ function useMotions(runs, channel, window) {
           .map(async (run) => {
             const { path, result, end } = run;
             const within = { from: window.from, to: Math.min(window.to, end) };
-            const options = { path, result, channels: [channel], window: within };
+            const own = channelIn(result.channels, channel);
+            const options = { path, result, channels: [own], window: within };
             const { time, columns } = await loadSeries({ ...options, pixels: PIXELS, signal });
-            return { run, time, column: columns.get(channel) };
+            return { run, time, column: columns.get(own) };
           }),
       ),
     [runs, channel, ...(isWhole ? [] : [window.from, window.to])],
@@ -97,28 +129,29 @@ function useMotions(runs, channel, window) {
 }
 
 function Motions({ runs, pairs, query, change }) {
-  const channels = runs[0].result.channels.filter((channel) =>
-    runs.every(({ result }) => result.channels.includes(channel)),
-  );
+  const channels = commonChannels(runs);
   const channel = channels.includes(query.channel) ? query.channel : channels[0];
   const end = Math.max(...runs.map((run) => run.end));
   const given = [Number(query.from ?? 0), Number(query.to ?? end)];
   const isGiven = query.from !== undefined || query.to !== undefined;
   const window = given[0] < given[1] ? { from: given[0], to: given[1] } : { from: 0, to: end };
   const loaded = useMotions(runs, channel, window);
-  const [differences, quiet] = useMemo(() => {
+  const [differences, isAllSame, quiet] = useMemo(() => {
     const [first, ...others] = loaded.data ?? [];
     const found = others.map((other) => ({ ...differenceOf(first, other), run: other.run }));
+    const isNoise = ({ y }) => y && largestOf(y) <= 1e-9 * largestOf(first.column.values);
     const until = (loaded.data ?? []).map(({ time, column }) =>
       column.values ? 1.1 * timeOfEnergy(time, column.values) : end,
     );
     const last = Math.max(0, ...until);
     return [
-      found.filter(({ x }) => x),
+      found.filter((one) => one.x && !isNoise(one)),
+      found.length > 0 && found.every(isNoise),
       last > 0 && last < QUIET_PART * end ? Number(last.toPrecision(2)) : null,
     ];
   }, [loaded.data]);
   if (channels.length === 0) return html`<p>They have no channel in common.</p>`;
+  const isTop = runs.some(({ result }) => !result.channels.includes(channel));
   const range = isGiven ? [window.from, window.to] : quiet && [0, quiet];
   const setRange = (next) => {
     const ends = next?.map((value) => Number(value.toPrecision(8)));
@@ -126,7 +159,7 @@ function Motions({ runs, pairs, query, change }) {
     change(ends ? { from: ends[0], to: ends[1] } : whole, true);
   };
   const isFirst = loaded.data?.[0]?.run === runs[0];
-  const unit = runs[0].result.units[channel];
+  const unit = runs[0].result.units[channelIn(runs[0].result.channels, channel)];
   const rules = runs.slice(1).flatMap((run, at) => {
     const divergence = divergenceOf(pairs[at]);
     return divergence
@@ -142,6 +175,7 @@ function Motions({ runs, pairs, query, change }) {
   const x = { label: "Time", unit: "s", domain: [0, end] };
   const shared = { x, range, onRange: setRange, group: "comparison" };
   return html`${channels.length > 1 && html`<p><${ChannelChoice} channels=${channels} channel=${channel} change=${change} /></p>`}
+  ${isTop && html`<p class="hint">Of a frame the top storey is shown.</p>`}
   ${loaded.error && html`<${Failure} error=${loaded.error} />`}
   ${
     loaded.data
@@ -165,7 +199,15 @@ function Motions({ runs, pairs, query, change }) {
               series=${differences.map(({ run, x: time, y }) => ({ label: `${run.label} less ${runs[0].label}`, color: run.color, x: time, y }))}
             />`
           }
-          ${isFirst && differences.length === 0 && html`<p class="hint">Zoom in to see the difference.</p>`}`
+          ${
+            isFirst &&
+            differences.length === 0 &&
+            !isAllSame &&
+            html`<p class="hint">
+              ${`With more than ${number(MOST_SAMPLES)} samples only their range is drawn: zoom in to see the difference.`}
+            </p>`
+          }
+          ${isFirst && isAllSame && html`<p class="hint">The motions differ by rounding at most.</p>`}`
       : html`<p class="quiet">Loading …</p>`
   }`;
 }
@@ -178,24 +220,30 @@ const ChannelChoice = ({ channels, channel, change }) =>
     onChange=${(value) => change({ channel: value }, true)}
   />`;
 
+const isSeen = (bands) => bands.some(({ level }) => Math.abs(level) > 1e-6); // above rounding
+
 function spectrumText(first, others, pairs) {
-  const parts = others.map(({ run, bands }) => {
-    const level = pairs[run.at - 1]?.psd?.[0]?.level;
+  const parts = others.flatMap(({ run, bands }) => {
+    const level = pairs[run.at - 1]?.psd?.[0]?.level ?? null;
     const most = furthestBand(bands);
-    const there = most
-      ? `, most around ${quantity(most.frequency, "Hz", 2)}: ${number(Math.abs(most.level), 2)} dB ${most.level > 0 ? "more" : "less"}`
-      : "";
-    return `${run.label} by ${number(level, 2)} dB${there}`;
+    const there =
+      most &&
+      `most around ${quantity(most.frequency, "Hz", 2)}: ${number(Math.abs(most.level), 2)} dB ${most.level > 0 ? "more" : "less"}`;
+    const texts = [level !== null && `by ${number(level, 2)} dB`, there].filter(Boolean);
+    return isSeen(bands) && texts.length > 0 ? `${run.label} ${texts.join(", ")}` : [];
   });
+  if (parts.length === 0) return "The spectra do not differ.";
   return `Apart from ${first.label}: ${parts.join("; ")}.`;
 }
 
 function Spectra({ runs, pairs }) {
-  const channel = pairs[0].psd?.[0]?.channel;
+  const all = Object.keys(runs[0].psd?.channels ?? {});
+  const channel = pairs[0].psd?.[0]?.channel ?? all[0]?.replace(/_\d+$/, "");
+  const densityOf = ({ psd }) => psd?.channels[channelIn(Object.keys(psd.channels), channel)];
   const [first, ...others] = useMemo(
     () =>
       runs
-        .map((run, at) => ({ ...run, at, density: run.psd?.channels[channel] }))
+        .map((run, at) => ({ ...run, at, density: densityOf(run) }))
         .filter(({ density }) => density)
         .map((run) => ({ ...run, x: run.psd.frequency.values, y: run.density.values })),
     [runs, channel],
@@ -203,31 +251,36 @@ function Spectra({ runs, pairs }) {
   if (!channel || others.length === 0 || first.at !== 0)
     return html`<p>They have no spectrum in common.</p>`;
   const levels = others.map((run) => ({ run, bands: bandDifferences(first, run) }));
+  const text = spectrumText(first, levels, pairs);
   const x = { label: "Frequency", unit: "Hz", log: true };
   const bands = levels.flatMap((one) => one.bands);
+  if (bands.length === 0) return html`<p>One of the spectra is zero everywhere.</p>`;
   const ends = [
     Math.min(...bands.map(({ low }) => low)),
     Math.max(...bands.map(({ high }) => high)),
   ];
-  return html`<p>${spectrumText(first, levels, pairs)}</p>
+  return html`<p>${text}</p>
     <div class="columns">
       <${Chart}
         title=${`Spectrum of the ${words(channel)}`}
-        description=${spectrumText(first, levels, pairs)}
+        description=${text}
         height=${220}
         x=${x}
         y=${{ label: "Density", unit: first.density.unit, log: true }}
         series=${[first, ...others].map(({ label, color, x: at, y }) => ({ label, color, x: at, y }))}
         group="spectra"
       />
-      <${Chart}
-        title="Level difference by third octaves"
-        height=${220}
-        x=${{ ...x, domain: bands.length > 0 ? ends : undefined }}
-        y=${{ label: `Level over ${first.label}`, unit: "dB" }}
-        series=${levels.map(({ run, bands }) => bandSeries(run.label, run.color, bands))}
-        group="spectra"
-      />
+      ${
+        isSeen(bands) &&
+        html`<${Chart}
+          title="Level difference by third octaves"
+          height=${220}
+          x=${{ ...x, domain: ends }}
+          y=${{ label: `Level over ${first.label}`, unit: "dB" }}
+          series=${levels.map(({ run, bands }) => bandSeries(run.label, run.color, bands))}
+          group="spectra"
+        />`
+      }
     </div>`;
 }
 
@@ -236,8 +289,41 @@ const ALIKE = 10; // pushes of up to this ratio share a chart
 const isAlike = (values) => Math.max(...values) < ALIKE * Math.min(...values);
 
 // The push of each run's first impact: a blow and a push each have a chart of their own.
-function FirstImpacts({ runs }) {
+function Pushes({ runs }) {
   const pushing = runs.filter(({ force }) => force && force.time.values.length > 2);
+  const series = pushing.map(({ label, color, force: { time, channels } }) => {
+    const forces = channels.contact_force.values;
+    const sign = Math.sign(forces[forces.length >> 2]);
+    return {
+      label,
+      color,
+      x: time.values.map((one) => one - time.values[0]),
+      y: forces.map((force) => force * sign),
+    };
+  });
+  if (series.length === 0) return null;
+  const lastOf = ({ x }) => x[x.length - 1];
+  const isOne = isAlike(series.map(lastOf)) && isAlike(series.map(({ y }) => Math.max(...y)));
+  const charts = isOne ? [series] : series.map((one) => [one]);
+  return html`<${Panel} title="Force of the first impacts" help="Impacts">
+    <div class="columns">
+      ${charts.map(
+        (shown) =>
+          html`<${Chart}
+            key=${shown[0]?.label}
+            title=${`Push of the first impact${isOne ? "" : `: ${shown[0].label}`}`}
+            height=${isOne ? 220 : 150}
+            x=${{ label: "Time since it began", unit: "s" }}
+            y=${{ label: isOne ? "Contact force" : `${shown[0].label}: contact force`, unit: "N", includeZero: true }}
+            series=${shown}
+            rules=${shown.map((one) => ({ x: lastOf(one), label: `contact time ${quantity(lastOf(one), "s", 3)}`, color: one.color }))}
+          />`,
+      )}
+    </div>
+  <//>`;
+}
+
+function FirstImpacts({ runs }) {
   const rows = [
     { label: "Start", unit: "s", of: (impact) => impact.start },
     { label: "Approach speed", unit: "m/s", of: (impact) => impact.approach_speed },
@@ -251,34 +337,12 @@ function FirstImpacts({ runs }) {
     unit,
     values: runs.map(({ impact }) => (impact ? of(impact) : null)),
   }));
-  const series = pushing.map(({ label, color, force: { time, channels } }) => {
-    const forces = channels.contact_force.values;
-    const sign = Math.sign(forces[forces.length >> 2]);
-    return {
-      label,
-      color,
-      x: time.values.map((one) => one - time.values[0]),
-      y: forces.map((force) => force * sign),
-    };
-  });
-  const lastOf = ({ x }) => x[x.length - 1];
-  const isOne = isAlike(series.map(lastOf)) && isAlike(series.map(({ y }) => Math.max(...y)));
-  const charts = isOne ? [series] : series.map((one) => [one]);
-  return html`<div class="columns">
-    ${charts.map(
-      (shown) =>
-        html`<${Chart}
-          key=${shown[0]?.label}
-          title=${`Push of the first impact${isOne ? "" : `: ${shown[0].label}`}`}
-          height=${isOne ? 220 : 150}
-          x=${{ label: "Time since it began", unit: "s" }}
-          y=${{ label: isOne ? "Contact force" : `${shown[0].label}: contact force`, unit: "N", includeZero: true }}
-          series=${shown}
-          rules=${shown.map((one) => ({ x: lastOf(one), label: `contact time ${quantity(lastOf(one), "s", 3)}`, color: one.color }))}
-        />`,
-    )}
-    <${ComparisonTable} caption="First impacts" head="Quantity" runs=${runs} rows=${rows} />
-  </div>`;
+  return html`<${ComparisonTable}
+    caption="First impacts"
+    head="Quantity"
+    runs=${runs}
+    rows=${rows}
+  />`;
 }
 
 // Of the summary, what is not the same for all.
@@ -298,11 +362,15 @@ export function Comparison({ comparison: { runs, pairs, inputs }, query, change 
   const hasImpacts = runs.some(({ impact }) => impact);
   const isNarrow = runs.length === 2; // tables of two runs stand beside the charts
   return html`<div class="comparison">
-    <${Lesson} runs=${runs} pairs=${pairs} />
+    <${Lesson} runs=${runs} pairs=${pairs} inputs=${inputs} />
     <div class=${isNarrow ? "split compare" : "compare"}>
-      <${Panel} title="Motion">
-        <${Motions} runs=${runs} pairs=${pairs} query=${query} change=${change} />
-      <//>
+      <div>
+        <${Panel} title="Motion">
+          <${Motions} runs=${runs} pairs=${pairs} query=${query} change=${change} />
+        <//>
+        <${Panel} title="Spectra" help="Spectrum"><${Spectra} runs=${runs} pairs=${pairs} /><//>
+        <${Pushes} runs=${runs} />
+      </div>
       <div class=${isNarrow ? null : "columns"}>
         <${Panel} title="Metrics" help="Summary">
           <${ComparisonTable}
@@ -313,6 +381,10 @@ export function Comparison({ comparison: { runs, pairs, inputs }, query, change 
             isDiffering
           />
         <//>
+        ${
+          hasImpacts &&
+          html`<${Panel} title="First impacts" help="Impacts"><${FirstImpacts} runs=${runs} /><//>`
+        }
         <${Panel} title="Inputs">
           <${ComparisonTable}
             caption="Inputs that differ"
@@ -320,11 +392,9 @@ export function Comparison({ comparison: { runs, pairs, inputs }, query, change 
             runs=${runs}
             rows=${inputs}
           />
-          ${warnings.map((text) => html`<p class="hint">${text}</p>`)}
+          ${warnings.map((text) => html`<p class="hint">${capital(text)}.</p>`)}
         <//>
       </div>
     </div>
-    <${Panel} title="Spectra" help="Spectrum"><${Spectra} runs=${runs} pairs=${pairs} /><//>
-    ${hasImpacts && html`<${Panel} title="First impacts" help="Impacts"><${FirstImpacts} runs=${runs} /><//>`}
   </div>`;
 }

@@ -83,7 +83,8 @@ function useProgress(loaded, query, reload) {
 export const targetOf = (job) =>
   job.result && !job.result_deleted ? `results/${job.result}` : `jobs/${job.id}`;
 
-function columnsOf(rows, schema, onCancel) {
+// Of inputs that vary among all rows, and what the shown ones have of the rest.
+function columnsOf(rows, shown, schema, onCancel) {
   const withScene = rows.filter(({ scene }) => scene);
   const all = varyingInputs(
     withScene.map(({ scene }) => scene),
@@ -103,7 +104,7 @@ function columnsOf(rows, schema, onCancel) {
       return { key: pointer, label: title(label), ...(isNumeric ? numeric : { value: plain }) };
     });
   const valueOf = (row, key) => row.summary?.[key] ?? null;
-  const metrics = METRICS.filter(({ key }) => rows.some((row) => valueOf(row, key) !== null)).map(
+  const metrics = METRICS.filter(({ key }) => shown.some((row) => valueOf(row, key) !== null)).map(
     (metric) => ({ ...metric, value: (row) => valueOf(row, metric.key) }),
   );
   const study = {
@@ -119,10 +120,10 @@ function columnsOf(rows, schema, onCancel) {
       value: (row) => [row.name, row.detail].filter(Boolean).join(", "),
       cell: (row) => html`<${NameCell} row=${row} onCancel=${onCancel} />`,
     },
-    ...(rows.some((row) => row.study) ? [study] : []),
+    ...(shown.some((row) => row.study) ? [study] : []),
     ...inputs,
     ...metrics,
-    ...(rows.every((row) => row.status === "successful") ? [] : [STATE]),
+    ...(shown.every((row) => row.status === "successful") ? [] : [STATE]),
     {
       key: "created",
       label: "Submitted",
@@ -145,7 +146,7 @@ const STATE = {
 
 const NameCell = ({ row, onCancel }) =>
   html`<a id=${row.id} href=${link(targetOf(row))}
-      >${row.name} ${row.detail && html`<span class="hint subtitle">${row.detail}</span>`}</a
+      >${row.name}${row.detail && html` <span class="hint subtitle">${row.detail}</span>`}</a
     >
     ${row.labels && html`<span class="hint subtitle">${row.labels.join(", ")}</span>`}
     ${isOpen(row) && html`<${Button} label=${`Cancel ${row.name}`} onClick=${() => onCancel(row)}>Cancel<//>`}`;
@@ -204,8 +205,8 @@ function orderOf(sort, columns) {
 }
 
 function RunsTable({ rows, schema, query, change, chosen, setChosen, onToggle, onCancel, onDone }) {
-  const columns = columnsOf(rows, schema, onCancel);
   const shown = matching(rows, query.q);
+  const columns = columnsOf(rows, shown, schema, onCancel);
   const chosenRows = shown.filter((row) => chosen.has(row.id)); // what is not seen is not acted on
   const setOrder = ({ column, direction }) =>
     change({ sort: `${direction < 0 ? "-" : ""}${columns[column].key}` });

@@ -30,9 +30,12 @@ function flatten(scene) {
   return found;
 }
 
+// But for rounding.
 export const isSame = (a, b) =>
   a === b ||
-  (typeof a === "number" && typeof b === "number" && Math.abs(a - b) <= 1e-9 * Math.abs(a));
+  (typeof a === "number" &&
+    typeof b === "number" &&
+    Math.abs(a - b) <= 1e-9 * Math.max(Math.abs(a), Math.abs(b)) + 1e-15);
 
 // The sections in the order of a scene's page, in each what is most often varied first.
 function rank(pointer) {

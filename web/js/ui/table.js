@@ -7,10 +7,11 @@ import { number, pretty, scale } from "../units.js";
 
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
 
-// The size that a column's unit suits: the largest, or the middle one where it is far below that.
+// The size that a column's unit suits: the largest, or a small one where many are far below that.
 function readableSize(sizes, largest) {
-  const middle = sizes.filter(Boolean).sort((a, b) => a - b)[sizes.filter(Boolean).length >> 1];
-  return middle < largest / 100 ? middle : largest;
+  const sorted = sizes.filter(Boolean).sort((a, b) => a - b);
+  const small = sorted[(sorted.length - 1) >> 2];
+  return small < largest / 100 ? small : largest;
 }
 
 // How a column of numbers is written: its factor and unit, and as many decimals as show `digits` digits of the largest.
@@ -28,7 +29,7 @@ export function columnFormat(values, unit, digits = 4) {
   while (places > 0 && values.every(isRound)) places--;
   // Values over many decades have digits of their own: none is shown as 0, or far off, for want of decimals.
   const isLost = (size) =>
-    Math.abs((size / factor).toFixed(places) - size / factor) > 0.05 * (size / factor);
+    Math.abs((size / factor).toFixed(places) - size / factor) > 0.02 * (size / factor);
   const isWide = sizes.some(isLost);
   const write = (value) => {
     if (!isNumber(value)) return number(value, digits);
