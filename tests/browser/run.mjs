@@ -46,7 +46,7 @@ async function slowDown(page) {
     asked.set(what, nth);
     const part = createHash("sha256").update(`${values.seed} ${what} ${nth}`).digest().readUInt32BE() / 2 ** 32;
     await new Promise((resolve) => setTimeout(resolve, part * LATE_MS));
-    await route.continue().catch(() => {}); // whoever asked may have left
+    await route.continue().catch(() => {}); // the page may be closed
   });
 }
 

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { says, test, until } from "./support.mjs";
 
-test("The trade is measured on the scene, chosen from by keyboard, known at once to whoever opens its URL, and another scene's is called so", async ({ page: first, newPage, url }) => {
+test("The trade is measured on the scene, chosen from by keyboard, kept in the URL, and another scene's is called so", async ({ page: first, newPage, url }) => {
   let page = first;
   await page.goto(url("#/scene"));
   await page.getByLabel("Duration [s]").fill("1");

@@ -71,7 +71,7 @@ test("The largest peak of a spectrum is named, others are laid over it, and the 
   await page.goto(url(`#/results/${sponge.result}?tab=spectrum`));
   const spectrum = page.getByRole("tabpanel");
   assert.match(await says(spectrum, /Largest .* Hz\./), new RegExp(`at ${Number(at.toPrecision(4))} Hz`.replace(".", "\\.")));
-  await spectrum.getByText("Lay other results over it").click();
+  await spectrum.getByText("Overlay other results").click();
   const other = spectrum.getByRole("checkbox", { name: /aluminium/ });
   await other.check();
   await until("the URL", () => page.url().includes(aluminium.result));

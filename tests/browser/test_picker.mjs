@@ -13,7 +13,7 @@ async function sceneOf(page) {
   return JSON.parse(text);
 }
 
-test("A material is chosen by keyboard and comes to k_b and c_b with their ± for this pair of masses", async ({ page, daemon, url }) => {
+test("A material is chosen by keyboard and its page gives k_b and c_b with their ± for this pair of masses", async ({ page, daemon, url }) => {
   await daemon.ask("POST", "v1/materials", FELT);
   await page.goto(url("#/scene"));
   const list = page.getByRole("combobox", { name: "Material" });

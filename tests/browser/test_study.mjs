@@ -64,7 +64,7 @@ test("A sweep by keyboard: the best point of contours opens, a small chart becom
   await leads(page, new RegExp(`point=${best}\\b`));
   await page.getByRole("button", { name: "Enlarge: Peak contact force" }).press("Enter");
   await leads(page, /metric=peak_contact_force/);
-  await says(page.getByRole("main"), /Least peak contact force: [\d.]+ N at mass/);
+  await says(page.getByRole("main"), /Least peak contact force: [\d.]+ N at damper mass/);
   await page.getByRole("button", { name: "Enlarge: RMS displacement" }).waitFor();
   assert.deepEqual(await axe(page), []);
   await page.goBack();
@@ -92,7 +92,7 @@ test("Contact models side by side: how far each is off, by a choice of measures,
   await until("changes", async () => /\+4\.18 %/.test(await bars.locator("svg").textContent()));
   for (const name of ["Spectra of the mean acceleration", "Displacement over time"]) await says(page.getByRole("figure", { name }), /impulse/);
   await says(page.getByRole("table", { name: "Numbers that differ" }), /Lankarani-Nikravesh/);
-  await says(main, /Not run: Hertz\. Buffer restitution must be 1 [^/]*; it is 0\.61\./);
+  await says(main, /Not run: Hertz\. Restitution must be 1 [^/]*; it is 0\.61\./);
   assert.deepEqual(await axe(page), []);
 });
 
@@ -124,10 +124,10 @@ test("A sweep's points by keyboard, and its URL gives the same point again", asy
 
 test("A sweep over a load names the worst point; its points open from the table", async ({ page, daemon, url }) => {
   const main = await open(page, daemon, url, "sweep_frequency");
-  await says(main, /Largest RMS displacement: 12\.09 mm at excitation frequency 3\.819 Hz\./);
+  await says(main, /Largest RMS displacement: 12\.09 mm at frequency 3\.819 Hz\./);
   await page.getByText("All points as a table").click();
   await page.getByRole("table", { name: "61 points" }).getByRole("button", { name: "28", exact: true }).click();
-  await says(main, /Point 28[^]*Excitation frequency\s+3\.819 Hz/);
+  await says(main, /Point 28[^]*Frequency\s+3\.819 Hz/);
 });
 
 test("Points that fail are told with their reason, and can be made again", async ({ page, daemon, url }) => {
@@ -205,7 +205,7 @@ test("Optimize over two numbers: every candidate on a map of both, coloured by t
   await page.goto(url(`#/results/${job.result}`));
   const map = page.getByRole("figure", { name: "The search" });
   await says(map, /RMS displacement of every candidate[^]*from [\d.]+ mm/);
-  await until("both axes", async () => /Mass \[kg\]/.test(await map.locator("svg").first().textContent()));
+  await until("both axes", async () => /Damper mass \[kg\]/.test(await map.locator("svg").first().textContent()));
   const plot = page.getByRole("application", { name: "The search" });
   await plot.hover({ position: { x: 300, y: 100 } });
   await says(map, /from [\d.]+ mm 0\.\d+ kg, [\d.]+ mm/);
@@ -214,10 +214,10 @@ test("Optimize over two numbers: every candidate on a map of both, coloured by t
 
 test("Calibrate: what was found and how well it is known, measured beside fitted, what is left", async ({ page, daemon, url }) => {
   const main = await open(page, daemon, url, "calibrate_free_sponge");
-  await says(main, /Explained: buffer restitution 0\.6098 ± [^,]+, buffer contact time 24\.99 ms ± 29 µs\./);
+  await says(main, /Explained: restitution 0\.6098 ± [^,]+, contact time 24\.99 ms ± 29 µs\./);
   await says(page.getByRole("figure", { name: "Displacement", exact: true }), /measured[^]*fitted/);
   await page.getByRole("figure", { name: "Displacement, measured less fitted" }).waitFor();
-  await says(page.getByRole("table", { name: "Parameters" }), /Buffer contact time\s+24\.99 ms\s+[\d.]+ µs\s+24\.9 ms to 25\.1 ms\s+yes/);
+  await says(page.getByRole("table", { name: "Parameters" }), /Contact time\s+24\.99 ms\s+[\d.]+ µs\s+24\.9 ms to 25\.1 ms\s+yes/);
   await says(page.getByRole("table", { name: "Residuals" }), /Displacement\s+101 µm/);
   assert.deepEqual(await axe(page), []);
   await page.getByRole("link", { name: "Propose a revision of sponge" }).click();
@@ -228,7 +228,7 @@ test("Calibrate: what was found and how well it is known, measured beside fitted
 
 test("Response: the largest motion against that without dampers; stable, unstable and irregular motions", async ({ page, daemon, url }) => {
   const main = await open(page, daemon, url, "response_sponge");
-  await says(main, /The largest displacement is [\d.]+ mm at excitation frequency [\d.]+ Hz, [\d.]+ % below the largest without dampers/);
+  await says(main, /The largest displacement is [\d.]+ mm at frequency [\d.]+ Hz, [\d.]+ % below the largest without dampers/);
   await says(page.getByRole("figure", { name: "Response curve" }), /without dampers[^]*stable[^]*unstable/);
   const curve = page.getByRole("application", { name: "Response curve" });
   const { width, height } = await curve.boundingBox();

@@ -65,6 +65,13 @@ export function quantity(value, unit, digits = 4) {
   return scaled && scaled !== "1" ? `${text} ${pretty(scaled)}` : text;
 }
 
+// A text of the service with readable numbers: "step 1e-05 s" as "step 10 µs", "0.000101 m" as "101 µm".
+export const readable = (text) =>
+  text.replace(
+    /(?<![\w.])(?:\d[\d.]*e[+-]?\d+|0\.00\d+(?= [msN]\b))(?: (m|s|N|Hz)(?![\w/^]))?/g,
+    (digits, unit) => quantity(parseFloat(digits), unit),
+  );
+
 // "m/s^2" as "m/s²".
 export const pretty = (unit) =>
   (unit ?? "").replace(/\^(-?\d+)/g, (_, power) => superscript(power));

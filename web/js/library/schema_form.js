@@ -3,7 +3,7 @@ import { swap } from "../address.js";
 import { post, schema as schemaNamed } from "../api.js";
 import { makeDraft, useNews } from "../form/draft.js";
 import { focusField, Form } from "../form/form.js";
-import { place } from "../form/place.js";
+import { place } from "../scene/inputs.js";
 import { Failure, faultText, Loaded, Notice } from "../ui/controls.js";
 import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
@@ -82,7 +82,7 @@ export function SchemaForm({ schema, value, label, send, isFocused, signal, ...o
   const focus = (element) => isFocused && element.closest("form").querySelector(".send").focus();
   return html`<form novalidate onSubmit=${submit} ref=${box}>
     <${Fields} schema=${schema} draft=${draft} onReady=${focus} ...${options} />
-    <button class="send">${label}</button>
+    <button class="send primary">${label}</button>
     <div role="status">${outcome}</div>
   </form>`;
 }

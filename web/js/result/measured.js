@@ -3,15 +3,14 @@
 import { html, useMemo, useState } from "../ui/preact.js";
 import { ask, post } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { bandDifferences, bandSeries, furthestBand } from "../runs/bands.js";
-import { readNpy } from "../npy.js";
+import { bandDifferences, bandSeries, bandText, furthestBand } from "../runs/bands.js";
+import { readNpy, timeOfEnergy, differenceOf } from "./series.js";
 import { Button, Choice, Failure, Loaded, Notice } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
 import { number, pretty, quantity, title, words } from "../units.js";
 import { useResult, windowOf } from "./context.js";
 import { readMeasured, VALUE_UNITS } from "./measured_file.js";
 import { quantityColor } from "./motion.js";
-import { timeOfEnergy } from "./series.js";
 
 const MOST_SAMPLES = 2e6;
 const AUDIBLE = 1e-3; // of the loudest third octave: quieter ones are not put into words
@@ -51,32 +50,6 @@ function compareMeasured(result, channel, { interval, start, values }, shift, si
   return post("v1/compare", body, { signal });
 }
 
-// The value at an instant, between samples on a line; null outside.
-function valueAt({ start, interval, values }, instant) {
-  const place = (instant - start) / interval;
-  const low = Math.floor(place + 1e-6);
-  if (low < 0 || place > values.length - 1 + 1e-6) return null;
-  const next = values[Math.min(values.length - 1, low + 1)];
-  return values[low] + Math.max(0, place - low) * (next - values[low]);
-}
-
-// {x, y} over the common span, at the samples of the coarser one; null where they have none.
-function differenceOf(series, measured, shift, rate) {
-  const simulated = { start: 0, interval: 1 / rate, values: series.values };
-  const later = { ...measured, start: measured.start + shift };
-  const coarser = measured.interval > simulated.interval ? later : simulated;
-  const [x, y] = [[], []];
-  for (let at = 0; at < coarser.values.length; at++) {
-    const instant = coarser.start + at * coarser.interval;
-    const own = valueAt(simulated, instant);
-    const other = valueAt(later, instant);
-    if (own === null || other === null) continue;
-    x.push(instant);
-    y.push(other - own);
-  }
-  return x.length < 2 ? null : { x, y };
-}
-
 // The measurement in a text file, or what is wrong with it.
 export function MeasuredText({ name, text }) {
   const { result } = useResult();
@@ -106,19 +79,20 @@ function Measured({ file }) {
     const factor = VALUE_UNITS[unit]?.[1] ?? 1;
     return { start: file.start, interval, values: file.values.map((value) => value * factor) };
   }, [file, unit, interval]);
+  const isShown = channel && result.count <= MOST_SAMPLES;
   const series = useLoaded(
-    (signal) => (channel ? loadChannel(path, channel, signal) : null),
+    (signal) => (isShown ? loadChannel(path, channel, signal) : null),
     [result.id, channel],
   );
   const found = useLoaded(
-    (signal) => (channel ? compareMeasured(result, channel, measured, undefined, signal) : null),
+    (signal) => (isShown ? compareMeasured(result, channel, measured, undefined, signal) : null),
     [result.id, channel, measured],
   );
   const best = found.data?.shift ?? 0;
   const shift = query.shift === undefined ? best : Number(query.shift) || 0;
   const compared = useLoaded(
     async (signal) => {
-      if (!channel || found.isLoading) return null;
+      if (!isShown || found.isLoading) return null;
       if (found.data?.shift === shift) return found.data;
       await new Promise((resolve) => setTimeout(resolve, PAUSE));
       return signal.aborted ? null : compareMeasured(result, channel, measured, shift, signal);
@@ -126,8 +100,10 @@ function Measured({ file }) {
     [found, shift],
   );
   if (!channel) return html`<p>${`The result has no channel in ${pretty(file.unit)}.`}</p>`;
-  if (result.count > MOST_SAMPLES)
-    return html`<p>The result has too many samples to be drawn here.</p>`;
+  if (!isShown)
+    return html`<p>
+      ${`The result has ${number(result.count)} samples; up to ${number(MOST_SAMPLES)} are compared here.`}
+    </p>`;
   return html`<div class="row level measured-row">
       <span
         ><strong>${`${file.name} `}</strong>
@@ -198,7 +174,11 @@ function Overlay({ series, measured, shift, channel, compared }) {
   const unit = result.units[channel];
   const rate = result.sample_rate;
   const difference = useMemo(
-    () => differenceOf(series, measured, shift, rate),
+    () =>
+      differenceOf(
+        { start: 0, interval: 1 / rate, values: series.values },
+        { ...measured, start: measured.start + shift },
+      ),
     [series, measured, shift],
   );
   const times = useMemo(
@@ -256,12 +236,15 @@ function Answer({ answer: { shift, unit, motion, ...answer } }) {
   const bands = bandDifferences(...densitiesOf(answer));
   const loudest = Math.max(...bands.map(({ mean }) => mean));
   const most = furthestBand(bands.filter(({ mean }) => mean > AUDIBLE * loudest));
-  const sentence =
-    `Moved by ${quantity(shift, "s")}, the measurement differs by ${quantity(motion.difference_rms, unit, 3)} rms, ` +
-    `${number(motion.relative && 100 * motion.relative, 3)} % of the simulated rms; correlation ${number(motion.correlation, 3)}.`;
-  const level = most
-    ? ` Most around ${quantity(most.frequency, "Hz", 2)}: ${number(Math.abs(most.level), 2)} dB ${most.level > 0 ? "more" : "less"} measured.`
-    : "";
+  const { relative } = motion;
+  const share =
+    (relative ?? null) === null ? "" : `, ${number(100 * relative, 3)} % of the simulated rms`;
+  const apart =
+    relative < 1e-9
+      ? "is the simulated motion but for rounding"
+      : `differs by ${quantity(motion.difference_rms, unit, 3)} rms${share}`;
+  const sentence = `Moved by ${quantity(shift, "s")}, the measurement ${apart}; correlation ${number(motion.correlation, 3)}.`;
+  const level = most ? ` Most ${bandText(most)} measured.` : "";
   return html`<p class="answer" role="status">${sentence + level}</p>`;
 }
 

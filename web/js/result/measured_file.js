@@ -3,6 +3,7 @@ import { numberRows } from "../ui/number_rows.js";
 import { number, words } from "../units.js";
 
 const LEAST = 16; // samples that the service compares
+const LARGEST = 1e100; // whose square is a number
 const TIME_UNITS = { s: 1, ms: 1e-3, µs: 1e-6, us: 1e-6, min: 60 };
 // What a measured value may be in: the SI unit of each and its factor.
 export const VALUE_UNITS = {
@@ -53,6 +54,11 @@ function checkRows(rows, columns) {
     if (at >= 0)
       throw new Error(
         `Line ${line}: "${cells[at].slice(0, 40)}" is not a number; ${example(hasTime)}.`,
+      );
+    const huge = numbers.findIndex((value) => Math.abs(value) > LARGEST);
+    if (huge >= 0)
+      throw new Error(
+        `Line ${line}: ${cells[huge].slice(0, 40)} is too large for a measured value; ${example(hasTime)}.`,
       );
   }
 }

@@ -6,10 +6,9 @@ import { Button, Loaded, sentence, withSubscripts } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
 import { pageOf } from "../ui/page.js";
 import { Table } from "../ui/table.js";
-import { place } from "../form/place.js";
-import { inputsOf, unitAt } from "../scene/inputs.js";
+import { inputsOf, place, unitAt } from "../scene/inputs.js";
 import { KINDS } from "../study/kinds.js";
-import { brief, moment, pretty, quantity, title } from "../units.js";
+import { brief, moment, pretty, quantity, readable, title } from "../units.js";
 import { ResultContext, jobsOf, useResultContext } from "./context.js";
 import { Energy } from "./energy.js";
 import { ResultHeadlines } from "./headlines.js";
@@ -81,7 +80,9 @@ function Report({ result, job, jobs, version, schema, View, signal }) {
   const { study } = result;
   const { study: asked, ...scene } = result.scene;
   const { warnings, links } = result;
-  const remarks = warnings.map(({ detail }) => html`<li>${withSubscripts(sentence(detail))}</li>`);
+  const remarks = warnings.map(
+    ({ detail }) => html`<li>${withSubscripts(sentence(readable(detail)))}</li>`,
+  );
   return html`<${ResultContext.Provider} value=${context}>
     <h1>${job?.title ?? "Result"}</h1>
     <p class="quiet">

@@ -1,10 +1,9 @@
 // The motion of a result in a window of time: every sample while there are few enough to draw, else the least and the largest
 // of buckets, one for each device pixel.
 import { ask, get } from "../api.js";
-import { readNpy } from "../npy.js";
 import { useLoaded } from "../ui/store.js";
 
-const MOST_SAMPLES = 50000;
+export const MOST_SAMPLES = 50000;
 
 // Few enough samples to load all of them, whatever the window.
 export const isWhole = ({ count }) => count <= MOST_SAMPLES;
@@ -64,4 +63,46 @@ export function timeOfEnergy(time, values, part = 0.9995) {
     if (sum >= part * total) return time[at];
   }
   return time[time.length - 1];
+}
+
+export function readNpy(buffer) {
+  const view = new DataView(buffer);
+  const isVersion1 = view.getUint8(6) === 1;
+  const length = isVersion1 ? view.getUint16(8, true) : view.getUint32(8, true);
+  const start = (isVersion1 ? 10 : 12) + length;
+  const header = new TextDecoder("latin1").decode(new Uint8Array(buffer, start - length, length));
+  const shape = /'shape':\s*\((\d+),\s*(\d*)\)/.exec(header);
+  if (!shape || !/'descr':\s*'<f8'/.test(header))
+    throw new Error("The series is not an array of float64.");
+  const rows = Number(shape[1]);
+  const columns = Number(shape[2] || 1);
+  return Array.from(
+    { length: columns },
+    (_, at) => new Float64Array(buffer.slice(start + 8 * rows * at, start + 8 * rows * (at + 1))),
+  );
+}
+
+// The value at an instant, between samples on a line; null outside.
+function valueAt({ start, interval, values }, instant) {
+  const place = (instant - start) / interval;
+  const low = Math.floor(place + 1e-6);
+  if (low < 0 || place > values.length - 1 + 1e-6) return null;
+  const next = values[Math.min(values.length - 1, low + 1)];
+  return values[low] + Math.max(0, place - low) * (next - values[low]);
+}
+
+// {x, y} of b - a over their common span, at the samples of the coarser one; null where they have none. Both are {start, interval,
+// values}.
+export function differenceOf(a, b) {
+  const coarser = b.interval > a.interval * (1 + 1e-9) ? b : a;
+  const [x, y] = [[], []];
+  for (let at = 0; at < coarser.values.length; at++) {
+    const instant = coarser.start + at * coarser.interval;
+    const own = valueAt(a, instant);
+    const other = valueAt(b, instant);
+    if (own === null || other === null) continue;
+    x.push(instant);
+    y.push(other - own);
+  }
+  return x.length < 2 ? null : { x, y };
 }

@@ -5,7 +5,7 @@ import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Loaded } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
-import { latest } from "../runs/latest.js";
+import { latest } from "../runs/names.js";
 import { number, pretty, words } from "../units.js";
 import { useResult } from "./context.js";
 

@@ -4,6 +4,7 @@ import { Notice } from "../ui/controls.js";
 import { ResultContext, useResultContext } from "./context.js";
 import { ResultHeadlines } from "./headlines.js";
 import { Motion } from "./motion.js";
+import { readable } from "../units.js";
 
 // `rest` is the module rest.js once it is loaded: nobody waits for it until onDrawn() says that the motion is there.
 export function ResultView({ result, signal, jobs, rest, onDrawn }) {
@@ -28,6 +29,6 @@ const Warnings = ({ warnings }) =>
     title=${warnings.length === 1 ? "A remark" : `${warnings.length} remarks`}
   >
     <ul>
-      ${warnings.map((warning) => html`<li>${warning.detail}</li>`)}
+      ${warnings.map((warning) => html`<li>${readable(warning.detail)}</li>`)}
     </ul>
   <//>`;

@@ -4,7 +4,7 @@ import { ask } from "../api.js";
 import { announce } from "../ui/announce.js";
 import { Button } from "../ui/controls.js";
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
-import { isOpen } from "./state.js";
+import { number } from "../units.js";
 
 const MOST_COMPARED = 4;
 const LETTERS = ["a", "b", "c", "d"];
@@ -97,3 +97,25 @@ export function Actions({ rows, hidden, isAll, onAll, onNone, onDone }) {
     ${rows.length + hidden > 0 && html`<${Button} isQuiet onClick=${onNone}>Choose none<//>`}
   </div>`;
 }
+
+export const STATES = {
+  accepted: "Waiting",
+  running: "Running",
+  successful: "Done",
+  failed: "Failed",
+  dismissed: "Cancelled",
+};
+const TONES = { running: "warn", successful: "ok", failed: "bad" };
+
+export const isOpen = ({ status }) => status === "accepted" || status === "running";
+
+// With the progress of what goes on, where the job has it.
+export const StateBadge = ({ job: { status, progress } }) =>
+  html`<span class=${`badge ${TONES[status] ?? ""}`}>${STATES[status]}</span> ${
+      status === "running" &&
+      progress !== undefined &&
+      html`<span class="progress">
+        <progress max="100" value=${progress} aria-label="Progress"></progress>
+        ${number(Math.floor(progress))} %
+      </span>`
+    }`;

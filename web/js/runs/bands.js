@@ -1,4 +1,6 @@
 // Third octaves of spectra: means of a density by bands of a tenth of a decade, and by how many dB two spectra differ in each.
+import { number, quantity } from "../units.js";
+
 const STEPS = 10; // to a decade
 
 // Map of a band's number k, around 10^(k / 10) Hz, to {mean, count} of the density there.
@@ -45,6 +47,10 @@ export const furthestBand = (bands) =>
   bands
     .filter(({ count }) => count > 2)
     .toSorted((a, b) => Math.abs(b.level) - Math.abs(a.level))[0];
+
+// "around 500 Hz: 39 dB more".
+export const bandText = ({ frequency, level }) =>
+  `around ${quantity(frequency, "Hz", 2)}: ${number(Math.abs(level), 2)} dB ${level > 0 ? "more" : "less"}`;
 
 // A chart's series of the bands.
 export const bandSeries = (label, color, bands) => ({

@@ -1,14 +1,21 @@
 // Results beside each other: what differs in words, their motions with the difference, their spectra, metrics, inputs and first
 // impacts. In the address: channel, from, to.
-import { html, useEffect, useMemo, useState } from "../ui/preact.js";
+import { html, useMemo } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Failure, Panel } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
-import { loadSeries, MOST_SAMPLES, seriesOf, timeOfEnergy } from "../result/series.js";
-import { capital, number, quantity, title, words } from "../units.js";
-import { bandDifferences, bandSeries, furthestBand } from "./bands.js";
-import { ComparisonTable } from "./comparison_table.js";
-import { isSame } from "./scenes.js";
+import {
+  isWhole,
+  loadSeries,
+  MOST_SAMPLES,
+  seriesOf,
+  timeOfEnergy,
+  differenceOf,
+} from "../result/series.js";
+import { capital, number, quantity, readable, title, words } from "../units.js";
+import { bandDifferences, bandSeries, bandText, furthestBand } from "./bands.js";
+import { ComparisonTable, FirstImpacts, Pushes } from "./comparison_table.js";
+import { isSame } from "./names.js";
 
 const PIXELS = 1600; // buckets of a long series
 const QUIET_PART = 0.7; // motions that die before this part of the run are shown until then
@@ -32,8 +39,9 @@ function pushText(runs) {
 function motionText(first, other) {
   const [a, b] = [first, other].map(({ result }) => result.summary.rms_displacement);
   if (!(a > 0) || Math.abs(b / a - 1) < 0.005) return null;
-  const change = `${number(Math.abs(100 * (b / a - 1)), 2)} % ${b > a ? "more" : "less"}`;
-  return `${other.label} moves ${change} than ${first.label} (rms ${quantity(b, "m", 3)} against ${quantity(a, "m", 3)}).`;
+  const share = `${number(Math.abs(100 * (b / a - 1)), 2)} % ${b > a ? "more" : "less"} than`;
+  const change = b > 3 * a ? `${number(b / a, 2)} times as much as` : share;
+  return `${other.label} moves ${change} ${first.label} (rms ${quantity(b, "m", 3)} against ${quantity(a, "m", 3)}).`;
 }
 
 const divergenceOf = (pair) => ((pair.divergence?.time ?? null) === null ? null : pair.divergence);
@@ -89,27 +97,16 @@ function commonChannels(runs) {
   return plain.filter((channel) => lists.every((list) => channelIn(list, channel)));
 }
 
-// b - a at a's samples; b lies between its own on a line.
-function differenceOf(a, b) {
-  const [values, others] = [a.column.values, b.column.values];
-  if (!values || !others || others.length < 2) return null;
-  const step = b.time[1] - b.time[0];
-  const difference = Array.from(a.time, (time, at) => {
-    const place = (time - b.time[0]) / step;
-    const low = Math.floor(place + 1e-9);
-    if (low < 0 || low >= others.length) return null;
-    const next = others[Math.min(others.length - 1, low + 1)];
-    return others[low] + Math.max(0, place - low) * (next - others[low]) - values[at];
-  });
-  return { x: a.time, y: difference };
-}
+// A motion by its samples; nothing where only their range is known.
+const samplesOf = ({ time, column: { values } }) =>
+  values && { start: time[0], interval: time[1] - time[0], values };
 
 const largestOf = (values) =>
   values.reduce((most, value) => Math.max(most, Math.abs(value ?? 0)), 0);
 
 // The series of one channel of each run: [{run, time, column}].
 function useMotions(runs, channel, window) {
-  const isWhole = runs.every(({ result }) => result.count <= MOST_SAMPLES);
+  const areWhole = runs.every(({ result }) => isWhole(result));
   return useLoaded(
     (signal) =>
       Promise.all(
@@ -124,7 +121,7 @@ function useMotions(runs, channel, window) {
             return { run, time, column: columns.get(own) };
           }),
       ),
-    [runs, channel, ...(isWhole ? [] : [window.from, window.to])],
+    [runs, channel, ...(areWhole ? [] : [window.from, window.to])],
   );
 }
 
@@ -138,7 +135,11 @@ function Motions({ runs, pairs, query, change }) {
   const loaded = useMotions(runs, channel, window);
   const [differences, isAllSame, quiet] = useMemo(() => {
     const [first, ...others] = loaded.data ?? [];
-    const found = others.map((other) => ({ ...differenceOf(first, other), run: other.run }));
+    const signals = loaded.data?.map(samplesOf) ?? [];
+    const found = others.map((other, at) => {
+      const pair = [signals[0], signals[at + 1]];
+      return { ...(pair.every(Boolean) && differenceOf(...pair)), run: other.run };
+    });
     const isNoise = ({ y }) => y && largestOf(y) <= 1e-9 * largestOf(first.column.values);
     const until = (loaded.data ?? []).map(({ time, column }) =>
       column.values ? 1.1 * timeOfEnergy(time, column.values) : end,
@@ -226,9 +227,7 @@ function spectrumText(first, others, pairs) {
   const parts = others.flatMap(({ run, bands }) => {
     const level = pairs[run.at - 1]?.psd?.[0]?.level ?? null;
     const most = furthestBand(bands);
-    const there =
-      most &&
-      `most around ${quantity(most.frequency, "Hz", 2)}: ${number(Math.abs(most.level), 2)} dB ${most.level > 0 ? "more" : "less"}`;
+    const there = most && `most ${bandText(most)}`;
     const texts = [level !== null && `by ${number(level, 2)} dB`, there].filter(Boolean);
     return isSeen(bands) && texts.length > 0 ? `${run.label} ${texts.join(", ")}` : [];
   });
@@ -284,67 +283,6 @@ function Spectra({ runs, pairs }) {
     </div>`;
 }
 
-const ALIKE = 10; // pushes of up to this ratio share a chart
-
-const isAlike = (values) => Math.max(...values) < ALIKE * Math.min(...values);
-
-// The push of each run's first impact: a blow and a push each have a chart of their own.
-function Pushes({ runs }) {
-  const pushing = runs.filter(({ force }) => force && force.time.values.length > 2);
-  const series = pushing.map(({ label, color, force: { time, channels } }) => {
-    const forces = channels.contact_force.values;
-    const sign = Math.sign(forces[forces.length >> 2]);
-    return {
-      label,
-      color,
-      x: time.values.map((one) => one - time.values[0]),
-      y: forces.map((force) => force * sign),
-    };
-  });
-  if (series.length === 0) return null;
-  const lastOf = ({ x }) => x[x.length - 1];
-  const isOne = isAlike(series.map(lastOf)) && isAlike(series.map(({ y }) => Math.max(...y)));
-  const charts = isOne ? [series] : series.map((one) => [one]);
-  return html`<${Panel} title="Force of the first impacts" help="Impacts">
-    <div class="columns">
-      ${charts.map(
-        (shown) =>
-          html`<${Chart}
-            key=${shown[0]?.label}
-            title=${`Push of the first impact${isOne ? "" : `: ${shown[0].label}`}`}
-            height=${isOne ? 220 : 150}
-            x=${{ label: "Time since it began", unit: "s" }}
-            y=${{ label: isOne ? "Contact force" : `${shown[0].label}: contact force`, unit: "N", includeZero: true }}
-            series=${shown}
-            rules=${shown.map((one) => ({ x: lastOf(one), label: `contact time ${quantity(lastOf(one), "s", 3)}`, color: one.color }))}
-          />`,
-      )}
-    </div>
-  <//>`;
-}
-
-function FirstImpacts({ runs }) {
-  const rows = [
-    { label: "Start", unit: "s", of: (impact) => impact.start },
-    { label: "Approach speed", unit: "m/s", of: (impact) => impact.approach_speed },
-    { label: "Restitution", unit: "1", of: (impact) => impact.restitution },
-    { label: "Contact time", unit: "s", of: (impact) => impact.duration },
-    { label: "Peak force", unit: "N", of: (impact) => impact.peak_force },
-    { label: "Impulse", unit: "N s", of: (impact) => impact.impulse },
-    { label: "Energy lost", unit: "J", of: (impact) => impact.energy_lost },
-  ].map(({ label, unit, of }) => ({
-    label,
-    unit,
-    values: runs.map(({ impact }) => (impact ? of(impact) : null)),
-  }));
-  return html`<${ComparisonTable}
-    caption="First impacts"
-    head="Quantity"
-    runs=${runs}
-    rows=${rows}
-  />`;
-}
-
 // Of the summary, what is not the same for all.
 function metricRows(runs) {
   const { summary, units } = runs[0].result;
@@ -392,7 +330,7 @@ export function Comparison({ comparison: { runs, pairs, inputs }, query, change 
             runs=${runs}
             rows=${inputs}
           />
-          ${warnings.map((text) => html`<p class="hint">${capital(text)}.</p>`)}
+          ${warnings.map((text) => html`<p class="hint">${capital(readable(text))}.</p>`)}
         <//>
       </div>
     </div>

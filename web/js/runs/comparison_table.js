@@ -1,8 +1,11 @@
-// Values of several runs beside each other: a row has one unit, the others' changes against the first stand below them.
+// Values of several runs beside each other: a row has one unit, the others' changes against the first stand below them. And of
+// their first impacts, with the forces.
 import { html } from "../ui/preact.js";
+import { Chart } from "../chart/chart.js";
+import { Panel } from "../ui/controls.js";
 import { columnFormat, Table } from "../ui/table.js";
-import { number, pretty, title } from "../units.js";
-import { isSame } from "./scenes.js";
+import { number, pretty, quantity, title } from "../units.js";
+import { isSame } from "./names.js";
 
 // "70.2 ×", "+4.2 %"; "" where that says nothing.
 export function changeText(value, first) {
@@ -53,5 +56,66 @@ export function ComparisonTable({ caption, head, runs, rows, isDiffering = false
     rows=${shown}
     keyOf=${(row) => row.heading}
     empty="Nothing differs."
+  />`;
+}
+
+const ALIKE = 10; // pushes of up to this ratio share a chart
+
+const isAlike = (values) => Math.max(...values) < ALIKE * Math.min(...values);
+
+// The push of each run's first impact: a blow and a push each have a chart of their own.
+export function Pushes({ runs }) {
+  const pushing = runs.filter(({ force }) => force && force.time.values.length > 2);
+  const series = pushing.map(({ label, color, force: { time, channels } }) => {
+    const forces = channels.contact_force.values;
+    const sign = Math.sign(forces[forces.length >> 2]);
+    return {
+      label,
+      color,
+      x: time.values.map((one) => one - time.values[0]),
+      y: forces.map((force) => force * sign),
+    };
+  });
+  if (series.length === 0) return null;
+  const lastOf = ({ x }) => x[x.length - 1];
+  const isOne = isAlike(series.map(lastOf)) && isAlike(series.map(({ y }) => Math.max(...y)));
+  const charts = isOne ? [series] : series.map((one) => [one]);
+  return html`<${Panel} title="Force of the first impacts" help="Impacts">
+    <div class="columns">
+      ${charts.map(
+        (shown) =>
+          html`<${Chart}
+            key=${shown[0]?.label}
+            title=${`Push of the first impact${isOne ? "" : `: ${shown[0].label}`}`}
+            height=${isOne ? 220 : 150}
+            x=${{ label: "Time since it began", unit: "s" }}
+            y=${{ label: isOne ? "Contact force" : `${shown[0].label}: contact force`, unit: "N", includeZero: true }}
+            series=${shown}
+            rules=${shown.map((one) => ({ x: lastOf(one), label: `contact time ${quantity(lastOf(one), "s", 3)}`, color: one.color }))}
+          />`,
+      )}
+    </div>
+  <//>`;
+}
+
+export function FirstImpacts({ runs }) {
+  const rows = [
+    { label: "Start", unit: "s", of: (impact) => impact.start },
+    { label: "Approach speed", unit: "m/s", of: (impact) => impact.approach_speed },
+    { label: "Restitution", unit: "1", of: (impact) => impact.restitution },
+    { label: "Contact time", unit: "s", of: (impact) => impact.duration },
+    { label: "Peak force", unit: "N", of: (impact) => impact.peak_force },
+    { label: "Impulse", unit: "N s", of: (impact) => impact.impulse },
+    { label: "Energy lost", unit: "J", of: (impact) => impact.energy_lost },
+  ].map(({ label, unit, of }) => ({
+    label,
+    unit,
+    values: runs.map(({ impact }) => (impact ? of(impact) : null)),
+  }));
+  return html`<${ComparisonTable}
+    caption="First impacts"
+    head="Quantity"
+    runs=${runs}
+    rows=${rows}
   />`;
 }

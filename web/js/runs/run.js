@@ -8,7 +8,7 @@ import { Sweep } from "../study/sweep.js";
 import { html, useEffect, useReducer, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { moment, number } from "../units.js";
-import { isOpen, StateBadge } from "./state.js";
+import { isOpen, StateBadge } from "./actions.js";
 
 const timeText = (seconds) =>
   seconds < 120 ? `${number(seconds, 2)} s` : `${Math.round(seconds / 60)} min`;

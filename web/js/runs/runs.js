@@ -9,11 +9,9 @@ import { html, useEffect, useReducer, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { moment, title } from "../units.js";
-import { Actions } from "./actions.js";
-import { namesOf } from "./names.js";
+import { Actions, isOpen, StateBadge, STATES } from "./actions.js";
+import { namesOf, varyingInputs } from "./names.js";
 import { valueText } from "./scene_name.js";
-import { varyingInputs } from "./scenes.js";
-import { isOpen, StateBadge, STATES } from "./state.js";
 
 const LIMIT = 100;
 const MOST_INPUTS = 3; // columns of them

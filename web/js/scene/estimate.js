@@ -1,6 +1,6 @@
 // The estimate of a scene, from a dry run: modes, cost, warnings. And faults by their places.
 import { link } from "../address.js";
-import { place } from "../form/place.js";
+import { place } from "./inputs.js";
 import { Failure, faultText } from "../ui/controls.js";
 import { html } from "../ui/preact.js";
 import { number, quantity, title, words } from "../units.js";

@@ -1,6 +1,6 @@
 // A result's motion at any instant: samples in pieces, fetched when they are needed and the next one ahead.
 import { ask } from "../api.js";
-import { readNpy } from "../npy.js";
+import { readNpy } from "../result/series.js";
 import { limit } from "./model.js";
 
 const PIECE = 6000; // numbers, few so that the first piece comes soon

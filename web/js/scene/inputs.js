@@ -1,6 +1,14 @@
 // What a scene states, place by place: every number, word and list with its label and its unit by the schema.
-import { place } from "../form/place.js";
-import { title } from "../units.js";
+import { title, words } from "../units.js";
+import { parts } from "../form/draft.js";
+
+// "/dampers/0/clearance" as "damper 1, clearance".
+export const place = (pointer) =>
+  parts(pointer)
+    .map(words)
+    .join(", ")
+    .replace("axes", "axis")
+    .replace(/(?<!i)s?, (\d+)/g, (_, at) => ` ${Number(at) + 1}`);
 
 export const isObject = (value) =>
   typeof value === "object" && value !== null && !Array.isArray(value);
@@ -28,6 +36,7 @@ export function unitAt(schema, pointer) {
 }
 
 function textOf(value) {
+  if (value === null || value.length === 0) return "none";
   if (Array.isArray(value)) {
     const rest = value.length - LONGEST;
     const text = value.slice(0, LONGEST).map(textOf).join(", ");
@@ -37,26 +46,19 @@ function textOf(value) {
   return typeof value === "string" ? value.replaceAll("_", " ") : String(value);
 }
 
-// Rows {pointer, label, value, unit, text}: `value` is a number or what the scene has there, `text` reads it.
-export function inputsOf(scene, schema) {
-  const rows = [];
-  const walk = (value, pointer) => {
-    if (isObject(value)) {
-      for (const [name, inner] of Object.entries(value)) walk(inner, `${pointer}/${name}`);
-      return;
-    }
-    if (Array.isArray(value) && value.some(isObject)) {
-      value.forEach((inner, at) => walk(inner, `${pointer}/${at}`));
-      return;
-    }
-    rows.push({
-      pointer,
-      label: title(place(pointer)),
-      value,
-      unit: unitAt(schema, pointer),
-      text: textOf(value),
-    });
-  };
-  walk(scene, "");
-  return rows;
+// [[pointer, value]] of what a scene states: what is an object, or a list of objects, by its members.
+export function valuesOf(value, pointer = "") {
+  const isList = Array.isArray(value) && value.some(isObject);
+  if (!isList && !isObject(value)) return [[pointer, value]];
+  return Object.entries(value).flatMap(([name, inner]) => valuesOf(inner, `${pointer}/${name}`));
 }
+
+// Rows {pointer, label, value, unit, text}: `value` is a number or what the scene has there, `text` reads it.
+export const inputsOf = (scene, schema) =>
+  valuesOf(scene).map(([pointer, value]) => ({
+    pointer,
+    label: title(place(pointer)),
+    value,
+    unit: unitAt(schema, pointer),
+    text: textOf(value),
+  }));

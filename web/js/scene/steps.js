@@ -2,8 +2,7 @@
 import { useNews } from "../form/draft.js";
 import { ChoiceField } from "../form/fields.js";
 import { Form } from "../form/form.js";
-import { place } from "../form/place.js";
-import { unitAt } from "./inputs.js";
+import { place, unitAt } from "./inputs.js";
 import { Help } from "../ui/controls.js";
 import { html, useEffect, useMemo } from "../ui/preact.js";
 import { title } from "../units.js";

@@ -1,5 +1,6 @@
 // Parameters fitted to a measurement: what they are and how well they are known, the measured and the fitted motion, what is
 // left between them.
+import { labelOf } from "../runs/names.js";
 import { html, useMemo } from "../ui/preact.js";
 import { link } from "../address.js";
 import { get } from "../api.js";
@@ -8,16 +9,7 @@ import { useResult } from "../result/context.js";
 import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import {
-  Bars,
-  Decision,
-  SceneLink,
-  between,
-  memberName,
-  quantities,
-  remarksOf,
-  sentence,
-} from "./parts.js";
+import { Bars, Decision, SceneLink, between, quantities, remarksOf, sentence } from "./parts.js";
 
 const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
 const unitOf = ({ unit }) => unit;
@@ -34,7 +26,7 @@ export function CalibrateStudy() {
   const { study } = result;
   const { parameters, detail, motions, residual_rms: residuals, shift } = study;
   const found = parameters
-    .map((one) => `${memberName(pointerOf(one))} ${parameterText(one)}`)
+    .map((one) => `${labelOf(pointerOf(one))} ${parameterText(one)}`)
     .join(", ");
   const remarks = [
     sentence(detail),
@@ -101,7 +93,7 @@ function Intervals({ parameters }) {
   const rows = parameters
     .filter(({ value, interval_95: interval }) => value !== 0 && interval)
     .map((one) => ({
-      label: title(memberName(pointerOf(one))),
+      label: title(labelOf(pointerOf(one))),
       from: 100 * (one.interval_95[0] / one.value - 1),
       to: 100 * (one.interval_95[1] / one.value - 1),
       color: one.identifiable === false ? "c6" : "c1",
@@ -117,7 +109,7 @@ function Intervals({ parameters }) {
 
 function Parameters({ parameters }) {
   const columns = [
-    { label: "Parameter", value: (one) => title(memberName(pointerOf(one))) },
+    { label: "Parameter", value: (one) => title(labelOf(pointerOf(one))) },
     quantities("Value", ({ value }) => value, unitOf),
     quantities("Standard error", (one) => one.standard_error, unitOf, 3),
     {

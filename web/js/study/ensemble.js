@@ -1,12 +1,13 @@
 // An ensemble: what a metric does over many runs, as a histogram or by its distribution; the fan of motions, quantiles of
 // spectra, shares of the inputs. In the address: metric, shape.
+import { labelOf } from "../runs/names.js";
 import { html, useMemo } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Bars, Decision, SceneLink, between, memberName, plainScene, quantities } from "./parts.js";
+import { Bars, Decision, SceneLink, between, plainScene, quantities } from "./parts.js";
 
 // Bins by the rule of Freedman and Diaconis, at least as many as that of Sturges.
 export function histogram(values) {
@@ -125,7 +126,7 @@ function Shares({ indices, metric }) {
     .filter((one) => one.metric === metric && one.total !== null)
     .sort((a, b) => b.total - a.total)
     .map(({ pointer, total, total_interval_95: interval, first }) => ({
-      label: memberName(pointer),
+      label: labelOf(pointer),
       to: 100 * total,
       interval: interval?.map((end) => 100 * end),
       text: `${number(100 * total, 3)} % (alone ${number(100 * first, 3)} %)`,

@@ -1,5 +1,6 @@
 // The best values: the search as it went, what they gain, how far they may vary, what comes close; for two objectives the
 // front of compromises.
+import { labelOf } from "../runs/names.js";
 import { valueText } from "../runs/scene_name.js";
 import { html, useMemo } from "../ui/preact.js";
 import { get, schema as schemaNamed } from "../api.js";
@@ -17,7 +18,6 @@ import {
   SceneLink,
   between,
   extentOfValues,
-  memberName,
   quantities,
   remarksOf,
 } from "./parts.js";
@@ -30,9 +30,7 @@ export function OptimizeStudy() {
   const schema = useLoaded(() => schemaNamed("scene"), []);
   const unitOf = (one) => (schema.data ? unitAt(schema.data, pointerOf(one)) : undefined);
   const values = (list) =>
-    list
-      .map((one) => `${memberName(pointerOf(one))} ${valueText(one.value, unitOf(one))}`)
-      .join(", ");
+    list.map((one) => `${labelOf(pointerOf(one))} ${valueText(one.value, unitOf(one))}`).join(", ");
   const { best, objectives, front, region, rivals, candidates, runs } = study;
   const [goal] = objectives;
   const remarks = [`${candidates} candidates, ${runs} runs.`, ...remarksOf(study)];
@@ -147,7 +145,7 @@ function Search({ study: { history, best, objectives }, unit, unitOf }) {
     notes: isMap && rows.map((one) => quantity(one.objectives[0], unit)),
   }));
   const axisOf = (at) => ({
-    label: title(memberName(pointerOf(variables[at]))),
+    label: title(labelOf(pointerOf(variables[at]))),
     unit: unitOf(variables[at]) ?? "1",
   });
   const label = `${title(metric)} of every candidate`;
@@ -222,7 +220,7 @@ function Front({ study: { front, objectives, best }, units, values }) {
 
 function Region({ region, unitOf }) {
   const columns = [
-    { label: "Member", value: (one) => title(memberName(pointerOf(one))) },
+    { label: "Member", value: (one) => title(labelOf(pointerOf(one))) },
     quantities("From", ({ low }) => low, unitOf),
     quantities("To", ({ high }) => high, unitOf),
   ];

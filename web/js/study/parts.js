@@ -1,29 +1,24 @@
-// What the pages of studies share: the sentence that a study leads to, ways to scenes and runs, names of members, bars.
+// What the pages of studies share: the sentence that a study leads to, ways to scenes and runs, bars.
 import { html, useEffect, useState } from "../ui/preact.js";
 import { go, link, pack } from "../address.js";
 import { Chart } from "../chart/chart.js";
 import { Button, Failure, withSubscripts } from "../ui/controls.js";
-import { quantity, words } from "../units.js";
+import { labelOf } from "../runs/names.js";
+import { quantity, readable } from "../units.js";
 
 // The scene alone, without its study.
 export const plainScene = ({ study, ...scene }) => scene;
 
-// "clearance" of "/dampers/0/clearance".
-export const memberName = (pointer) =>
-  words(pointer.replace(/^\/(dampers\/0\/)?/, "").replaceAll("/", " "));
-
 // A clause of the service as a sentence; a member is named by its words.
 export const sentence = (clause) =>
-  `${clause
-    .replace(/^(\/\S+):/, (_, pointer) => memberName(pointer))
+  `${readable(clause)
+    .replace(/^(\/\S+):/, (_, pointer) => labelOf(pointer))
     .replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase())}.`;
 
 // What the service remarks on a study, a sentence each; one without a subject is about the member that it points at.
 export const remarksOf = ({ warnings }) =>
   warnings.map(({ pointer, detail }) =>
-    sentence(
-      /^(may|is|has) /.test(detail) ? `${words(pointer.split("/").at(-1))} ${detail}` : detail,
-    ),
+    sentence(/^(may|is|has) /.test(detail) ? `${labelOf(pointer)} ${detail}` : detail),
   );
 
 export const between = (low, high, unit) =>

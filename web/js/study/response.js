@@ -7,7 +7,8 @@ import { share } from "../result/headlines.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { quantity, title } from "../units.js";
-import { Decision, memberName, remarksOf } from "./parts.js";
+import { Decision, remarksOf } from "./parts.js";
+import { labelOf } from "../runs/names.js";
 
 const STABLE = { true: "yes", false: "no" };
 const METRICS = ["peak_displacement", "rms_displacement"];
@@ -85,7 +86,7 @@ export function ResponseStudy() {
   const { result, query, change } = useResult();
   const { study } = result;
   const { points, unit, pointer, pointers } = study;
-  const name = memberName(pointer ?? pointers[0]);
+  const name = labelOf(pointer ?? pointers[0]);
   const metric = METRICS.includes(query.metric) ? query.metric : METRICS[0];
   const series = useMemo(() => {
     const irregular = points.filter(({ period }) => !period);

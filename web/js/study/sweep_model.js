@@ -2,7 +2,8 @@
 // point.
 import { valueText } from "../runs/scene_name.js";
 import { title } from "../units.js";
-import { extentOfValues, memberName } from "./parts.js";
+import { extentOfValues } from "./parts.js";
+import { labelOf } from "../runs/names.js";
 
 // Metrics of the structure's response, of which less is better, the first question of a sweep.
 const RESPONSES = /^(rms|peak)_(displacement|acceleration|storey_drift|base_shear)$/;
@@ -15,7 +16,7 @@ function axisOf({ pointer, pointers, unit, values }, index, all) {
     pointer: place,
     unit,
     values,
-    label: title(memberName(place)),
+    label: title(labelOf(place)),
     isNumeric: values.every((value) => typeof value === "number"),
     texts: values.map((value) => valueText(value, unit, 5)),
     step: all.slice(index + 1).reduce((product, axis) => product * axis.values.length, 1),
@@ -96,7 +97,7 @@ export const placeText = (model, row) =>
       const value = model.isGrid
         ? model.axes[index].values[positionsOf(model, row)[index]]
         : model.columns[pointer]?.values[row];
-      return `${memberName(pointer)} ${valueText(value, unit)}`;
+      return `${labelOf(pointer)} ${valueText(value, unit)}`;
     })
     .join(", ");
 

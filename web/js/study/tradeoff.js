@@ -5,7 +5,7 @@ import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
 import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
-import { capital, number, quantity, words } from "../units.js";
+import { capital, number, quantity, readable, words } from "../units.js";
 import { Decision, SceneLink, plainScene } from "./parts.js";
 
 // The scene run this way.
@@ -23,12 +23,6 @@ function applied(scene, way) {
     }),
   };
 }
-
-// "rk4, step 1e-05 s" as "rk4, step 10 µs".
-const readable = (text) =>
-  text
-    .replace(/(\d[\d.e-]*) s\b/g, (_, seconds) => quantity(Number(seconds), "s", 3))
-    .replace(/\d[\d.]*e-?\d+/g, (digits) => number(Number(digits)));
 
 // Ways that differ in a number alone: "rk4, any step".
 const familyOf = ({ name }) =>

@@ -4,8 +4,11 @@
 const isDecimalComma = (line) =>
   /[;\t]/.test(line) || (/\d,\d/.test(line) && /\s/.test(line) && !/,\s|\d,\d+,/.test(line));
 
+// Separators at the end of a line begin no cell.
+const trimmed = (line) => line.replace(/[\s,;]+$/, "").trimStart();
+
 function cellsOf(line) {
-  const text = line.trim();
+  const text = trimmed(line);
   if (!isDecimalComma(text)) return text.split(/\s*,\s*|\s+/);
   return text
     .split(/\s*[;\t]\s*|\s+/)
@@ -14,8 +17,7 @@ function cellsOf(line) {
 }
 
 const headsOf = (line) =>
-  line
-    .trim()
+  trimmed(line)
     .split(/\s*[;\t]\s*|\s*,\s*/)
     .map((cell) => cell.replace(/^["']|["']$/g, ""));
 
@@ -24,7 +26,7 @@ const numberOf = (cell) => (/^[+-]?(\d|\.\d)/.test(cell) ? Number(cell) : NaN);
 // {heads, rows: [{line, cells, numbers}]} from the first line of numbers alone to the last line that is not empty; `line`
 // counts from 1. `isRow(numbers)` says which line begins the rows.
 export function numberRows(text, isRow = (numbers) => numbers.every(Number.isFinite)) {
-  const lines = text.replace(/^\uFEFF/, "").split(/\r?\n/);
+  const lines = text.replace(/^\uFEFF/, "").split(/\r\n?|\n/);
   const all = lines.map((line, at) => {
     const cells = cellsOf(line);
     return { line: at + 1, cells, numbers: cells.map(numberOf) };
