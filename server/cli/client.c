@@ -21,6 +21,7 @@
 #include "server/cli/files.h"
 #include "server/cli/report.h"
 #include "server/db/records.h"
+#include "server/http/header.h"
 #include "server/util/clock.h"
 
 enum {
@@ -279,6 +280,21 @@ static void headers_read(const Transfer *transfer) {
     answer->retry_after = seconds > 86400 ? 86400 : (int)seconds;
 }
 
+// Another program may answer anything with 200: nothing of it is written.
+static bool transfer_check_type(Transfer *transfer) {
+    const char *wanted = transfer->request->type, *type = header_get(transfer, "Content-Type");
+    char shown[60];
+    if (wanted == NULL || header_type_is(type, wanted))
+        return true;
+    text_fit(shown, sizeof shown, type[0] != '\0' ? type : "of no type");
+    text_make_printable(shown);
+    transfer->status = problem_set(transfer->problem, STATUS_UNREACHABLE,
+                                   "the answer is %s, not %s; is the server at %.200s really "
+                                   "impactd?",
+                                   shown, wanted, transfer->call->url);
+    return false;
+}
+
 static size_t header_count(char *line, size_t one, size_t count, void *context) {
     Transfer *transfer = context;
     (void)line;
@@ -302,6 +318,8 @@ static size_t body_read(char *piece, size_t one, size_t count, void *context) {
         bytes_put(body, piece, size);
         if (body->is_failed)
             (void)transfer_refuse(transfer, "a document", DOCUMENT_MAX);
+    } else if (transfer->received == 0 && !transfer_check_type(transfer)) {
+        return 0;
     } else if (size > max - transfer->received) {
         transfer->status =
             problem_set(transfer->problem, STATUS_TOO_LARGE, "the answer is larger than %llu bytes",

@@ -81,6 +81,7 @@ typedef struct ApiRequest {
     // > 0: the body of a 200 of at most this size goes to the open output, and one that is cut off
     // is continued once. 0: the body is kept.
     uint64_t output_max;
+    const char *type; // Content-Type that such a body must have; NULL: any
 } ApiRequest;
 
 // Runs one of the actions of `self` on settings that begin with a ClientSettings. Prints the reason

@@ -12,6 +12,7 @@
 #include "server/cli/client.h"
 #include "server/cli/files.h"
 #include "server/cli/report.h"
+#include "server/http/reply.h"
 #include "server/jobs/job.h"
 #include "server/json/document.h"
 #include "server/util/clock.h"
@@ -401,6 +402,9 @@ static Status compare_act(ApiCall *call, Problem *problem) {
 }
 
 static const char *const formats[] = {"json", "csv", "npy", "npz", "mat", "zip", "svg", NULL};
+static const char *const format_types[] = {
+    "application/json",          "text/csv",        "application/x-npy", "application/x-npz",
+    "application/x-matlab-data", "application/zip", "image/svg+xml"};
 static const char *const binary_formats[] = {"npy", "npz", "mat", "zip", NULL};
 // Parts of a result that have one format, and no extension in their path.
 static const char *const parts[] = {"series", "psd",    "impacts", "energy", "manifest",
@@ -475,6 +479,17 @@ static const Field get_fields[] = {
 };
 // clang-format on
 
+// The Content-Type of a part; NULL if its extension is unknown.
+static const char *part_type(const char *what) {
+    const char *extension = path_extension(what);
+    if (extension == NULL)
+        return type_json;
+    for (size_t i = 0; formats[i] != NULL; i++)
+        if (strcmp(formats[i], extension) == 0)
+            return format_types[i];
+    return NULL;
+}
+
 static Status get_act(ApiCall *call, Problem *problem) {
     const JobsSettings *settings = call->settings;
     char what[PART_SIZE], result[96];
@@ -487,7 +502,8 @@ static Status get_act(ApiCall *call, Problem *problem) {
     const bool is_whole = is_job || strcmp(what, "result") == 0;
     ApiRequest request = {.path = api_path("/v1/%s/%s%s%s", is_job ? "jobs" : "results", result,
                                            is_whole ? "" : "/", is_whole ? "" : what),
-                          .output_max = settings->max_bytes};
+                          .output_max = settings->max_bytes,
+                          .type = part_type(what)};
     api_query_options(&request.path, call, "channels from to points");
     Terminal terminal;
     if (call->count == 1 && settings->output == NULL && terminal_find(&terminal)) {

@@ -133,10 +133,26 @@ static size_t utf8_length(const unsigned char *text) {
     return 0;
 }
 
+// Wide characters of East Asia (UAX #11) and pictographs, by the first three bytes of their UTF-8,
+// whose order is that of the characters.
+static bool utf8_is_wide(const char *text) {
+    static const struct {
+        const char *first, *last;
+    } ranges[] = {{"\xE1\x84\x80", "\xE1\x85\x9F"}, {"\xE2\xBA\x80", "\xEA\x93\x86"},
+                  {"\xEA\xB0\x80", "\xED\x9E\xA3"}, {"\xEF\xA4\x80", "\xEF\xAB\xBF"},
+                  {"\xEF\xB8\xB0", "\xEF\xB9\xAF"}, {"\xEF\xBC\x81", "\xEF\xBD\xA0"},
+                  {"\xEF\xBF\xA0", "\xEF\xBF\xA6"}, {"\xF0\x9F\x8C", "\xF0\x9F\x99"},
+                  {"\xF0\x9F\xA4", "\xF0\x9F\xA7"}, {"\xF0\xA0\x80", "\xF0\xBF\xBF"}};
+    for (size_t i = 0; (unsigned char)*text >= 0xE1 && i < sizeof ranges / sizeof ranges[0]; i++)
+        if (strncmp(text, ranges[i].first, 3) >= 0 && strncmp(text, ranges[i].last, 3) <= 0)
+            return true;
+    return false;
+}
+
 size_t text_width(const char *text) {
     size_t width = 0;
     for (; *text != '\0'; text++)
-        width += ((unsigned char)*text & 0xC0) != 0x80;
+        width += (((unsigned char)*text & 0xC0) != 0x80) + (utf8_is_wide(text) ? 1U : 0U);
     return width;
 }
 

@@ -31,7 +31,7 @@ void bytes_json_string(Bytes *bytes, const char *text);
 // text, NULL is null; %d, %zu and %llu whole numbers. There are no others.
 void bytes_json(Bytes *bytes, const char *format, ...) __attribute__((format(printf, 2, 3)));
 const char *json_flag(bool flag); // "true" or "false"
-// The number of UTF-8 characters; on a terminal most of them take one column.
+// The columns of a terminal that UTF-8 text takes: two for a wide character of East Asia, else one.
 size_t text_width(const char *text);
 // Whether all of a text is UTF-8.
 bool text_is_utf8(const char *text);

@@ -168,7 +168,7 @@ def test_binary_data_is_kept_off_a_terminal():
     os.close(slave)
     os.close(master)
     assert done.returncode == 2 and "-o FILE.npy" in done.stderr, done
-    with fake(say(body=b"NUMPY\x1b")) as (url, _):
+    with fake(say(body=b"NUMPY\x1b", kind="application/x-npy")) as (url, _):
         code, out = program.on_terminal("get", "r-1", "series.npy", "-o", "-", IMPACTD_SERVER=url)
         assert code == 0 and out == "NUMPY\x1b", out
 
@@ -453,6 +453,20 @@ def test_a_download_that_is_cut_goes_on_once():
                 assert seen[1][2]["Range"] == f"bytes={half}-" and seen[1][2]["If-Range"] == '"e"', seen[1]
             else:
                 assert os.listdir(folder) == [] and len(seen) <= 2, (os.listdir(folder), seen)
+
+
+def test_a_file_is_written_only_of_what_was_asked():
+    """A 200 of another Content-Type, as that of a proxy's page of sign-in, is no result: exit code 7, and no file."""
+    page = say(body=b"<html>sign in</html>", kind="text/html; charset=utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "x.csv")
+        with fake(page) as (url, _):
+            for arguments in (("series", "-o", path), ("result",), ("psd.svg",)):
+                code, out, errors = client(url, "get", "r-1", *arguments)
+                assert code == 7 and out == "" and "the answer is text/html" in errors and "really impactd" in errors, (code, errors)
+        assert os.listdir(folder) == []
+        with fake(say(body=b"time [s]\n0\n", kind="text/csv; charset=utf-8")) as (url, _):
+            assert client(url, "get", "r-1", "series", "-o", path) == (0, "", "")
 
 
 def test_compare_prints_what_differs():

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import pickle
+import pickle
 import signal
 import subprocess
 import sys
@@ -328,6 +329,9 @@ def test_tokens_and_passwords_stay_secret():
     with fake(say(body=b'{"version": "x"}')) as (url, seen):
         lab = impactd.connect(url, " s3cret-token\r\n")
         assert seen[0][2]["Authorization"] == "Bearer s3cret-token" and "s3cret" not in repr(lab)
+        assert b"s3cret" not in pickle.dumps(lab)
+        with unittest.mock.patch.dict(os.environ, {"IMPACTD_TOKEN": "another"}):
+            assert pickle.loads(pickle.dumps(lab))._http.token == "another"
         for wrong in ("s3cret\nX: y", "s3cr\u00e9t", "s3cret token", "s3cret" * 100, b"s3cret"):
             error = raised(ValueError, impactd.connect, url, wrong)
             assert "s3cr" not in "".join(traceback.format_exception(None, error, None)), error
@@ -487,6 +491,10 @@ def test_files_are_whole_or_absent():
         with open(os.path.join(folder, "a.json"), encoding="utf-8") as file:
             assert set(json.load(file)) == {"job", "series", "impacts", "psd"}
         kept = sorted(os.listdir(folder))
+        nowhere = os.path.join(folder, "none", "a.csv")
+        assert raised(FileNotFoundError, r.save, nowhere).filename == nowhere
+        copy = pickle.loads(pickle.dumps(r))
+        assert copy.summary == r.summary and copy.psd()[0][1] == r.psd()[0][1] and len(copy.time) == 10001
         assert refused(r.save, os.path.join(folder, "a.html")).status == 404 and sorted(os.listdir(folder)) == kept
 
 

@@ -348,6 +348,7 @@ class _Http:
         parts, self.port = _address(url)
         self.url = f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}"
         self.host, self.base = parts.hostname or "", parts.path.rstrip("/")
+        self.ca_file = ca_file
         self.tls = ssl.create_default_context(cafile=ca_file) if parts.scheme == "https" else None
         self.token, self.timeout, self.patience = _token(token), timeout, patience
         if self.token and self.tls is None and not _is_loopback(self.host):
@@ -355,6 +356,10 @@ class _Http:
         self.idle: list[http.client.HTTPConnection] = []
         self.lock = threading.Lock()
         self.is_known = False  # whether it has answered before: then it may be starting again
+
+    def __reduce__(self) -> Any:
+        """For pickle, without connections. The token stays out of files: IMPACTD_TOKEN is used then."""
+        return _reopened, (self.url, self.ca_file, self.timeout, self.patience)
 
     def close(self) -> None:
         with self.lock:
@@ -812,7 +817,11 @@ class Result:
         name = "bundle.zip" if extension == "zip" else f"{_name(part or self._table_part)}.{_name(extension)}"
         whole = _encode(self._whole()) if extension == "json" and part is None else None
         folder = os.path.dirname(os.path.abspath(path))
-        handle, draft = tempfile.mkstemp(prefix=".impactd-", dir=folder)
+        try:
+            handle, draft = tempfile.mkstemp(prefix=".impactd-", dir=folder)
+        except OSError as error:
+            error.filename = path
+            raise
         try:
             with open(handle, "wb") as file:
                 if whole is None:
@@ -1045,6 +1054,11 @@ def connect(url: Optional[str] = None, token: Optional[str] = None, *, ca_file: 
     """
     return Lab(url or os.environ.get("IMPACTD_SERVER") or "http://127.0.0.1:8080",
                token or os.environ.get("IMPACTD_TOKEN") or None, ca_file, timeout, patience, cancel_on_interrupt)
+
+
+def _reopened(*arguments: Any) -> _Http:
+    url, *others = arguments
+    return _Http(url, os.environ.get("IMPACTD_TOKEN"), *others)
 
 
 class Lab:

@@ -135,3 +135,18 @@ TEST(json_is_written_by_a_format) {
                         "\"g\": null, \"h\": -1, \"i\": 7, \"j\": true}\n");
     bytes_clear(&bytes);
 }
+
+TEST(wide_characters_take_two_columns) {
+    static const struct {
+        const char *text;
+        size_t width;
+    } cases[] = {{"", 0},
+                 {"a\xC3\xBC", 2},
+                 {"\xE5\xBB\xBA\xE7\x89\xA9", 4},
+                 {"\xEA\xB0\x80", 2},
+                 {"\xE2\x82\xAC", 1},
+                 {"\xEF\xBD\xB1", 1},
+                 {"\xF0\x9F\x8F\xA2", 2}};
+    for (size_t i = 0; i < COUNT(cases); i++)
+        assert_int_equal(text_width(cases[i].text), cases[i].width);
+}
