@@ -56,6 +56,8 @@ test("An impulse has no force; what was not asked for is told without asking", a
 test("The ledger lists impacts, sorts them and opens one", async ({ page, daemon, url }) => {
   const job = await daemon.run("frame_two_dampers");
   await page.goto(url(`#/results/${job.result}`));
+  for (const name of ["storey 1", "storey 3", "storey 3 without dampers", "damper 2"])
+    await page.getByRole("region", { name: "Motion over time" }).getByRole("button", { name, exact: true }).waitFor();
   const ledger = page.getByRole("tabpanel");
   await ledger.getByRole("columnheader", { name: "Peak force" }).getByRole("button").click();
   await until("the order", async () => (await ledger.getByRole("columnheader", { name: "Peak force" }).getAttribute("aria-sort")) === "ascending");

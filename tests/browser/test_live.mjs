@@ -16,7 +16,7 @@ test("A slider runs the scene as it moves; undo and redo take steps back and for
   await until("the field to follow", async () => Number(await clearance(page).inputValue()) > 0.02);
   const moved = await clearance(page).inputValue();
   await says(live(page), /rms −(?!30\.8)[\d.]+ %/);
-  await live(page).getByRole("button", { name: "Undo" }).click();
+  await page.getByRole("button", { name: "Undo" }).click();
   await until("the clearance of before", async () => (await clearance(page).inputValue()) === "0.015");
   await says(live(page), /rms −30\.8 %/);
   await page.getByRole("heading", { name: "Live" }).click();
@@ -56,7 +56,7 @@ test("What is dragged in the drawing changes the scene, runs it, and is one step
   await says(live(page), /22 impacts/);
   await page.getByRole("heading", { name: "The scene as JSON" }).click();
   await page.evaluate(() => scrollTo(0, 0));
-  const undo = live(page).getByRole("button", { name: "Undo" });
+  const undo = page.getByRole("button", { name: "Undo" });
   const scene = async () => JSON.parse(await page.getByRole("textbox", { name: "The scene as JSON" }).inputValue());
   await drag(page, "Clearance", 30, 0);
   const wider = (await scene()).dampers[0].clearance;
@@ -111,4 +111,34 @@ test("A run that is too long for a preview says so; how long a frame of the live
   console.log(`      script and layout of a step: ${frames[20].toFixed(1)} ms, at the 95th percentile ${frames[38].toFixed(1)} ms`);
   await page.getByLabel("Duration [s]").fill("3000");
   await says(live(page), /too long for a preview/);
+});
+
+test("A clearance of nothing is dragged and slid back, also where nothing else has a length", async ({ page, url }) => {
+  await page.goto(url("#/scene?example=paper_random_sponge"));
+  await clearance(page).fill("0");
+  await page.keyboard.press("Tab");
+  await handle(page, "Clearance").focus();
+  await page.keyboard.press("ArrowRight");
+  await until("a clearance", async () => (await clearance(page).inputValue()) === "0.001");
+  await clearance(page).fill("0");
+  await slider(page, "Clearance").press("ArrowRight");
+  await until("a clearance again", async () => Number(await clearance(page).inputValue()) > 0);
+});
+
+test("A tower whose preview takes too long is not asked for one", async ({ page, url, daemon }) => {
+  const storeys = 200;
+  const { id } = await daemon.ask("POST", "/v1/jobs", {
+    structure: { masses: Array(storeys).fill(1000), stiffnesses: Array(storeys).fill(1e6), damping_ratio: 0.02, kind: "frame" },
+    dampers: [{ mass: 50, clearance: 0.02, buffer: "sponge" }],
+    excitation: { kind: "random", band: [0, 15], rms: 1, seed: 1 },
+    duration: 20,
+    sample_rate: 1000,
+  });
+  let asked = 0;
+  page.on("request", (request) => /v1\/preview/.test(request.url()) && asked++);
+  await page.goto(url(`#/scene?job=${id}`));
+  await says(live(page), /too long for a preview/);
+  await slider(page, "Clearance").press("ArrowRight");
+  await page.waitForTimeout(1500);
+  assert.equal(asked, 0);
 });

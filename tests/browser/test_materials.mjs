@@ -123,7 +123,7 @@ test("A force trace is read from a file; its contacts are drawn with the pulses 
   await page.goto(url("#/materials/soft_rubber/measure"));
   await page.getByRole("button", { name: "Add trace" }).click();
   await choose(page, folder, "trace.csv", `time [s],force [N]\n${csv(rows)}`);
-  await says(main(page), /Contacts detected: 2; \S+ N at (100|99\.9) ms, T_c 3[12]\.?\d* ms, e 0\.5/);
+  await says(main(page), /Contacts detected: 2; \S+ N at (100|99\.9) ms, contact time 3[12]\.?\d* ms, e 0\.5/);
   const drawn = (await column(page, "Force of trace 1", "fitted by zero penetration")).filter((text) => text !== "–");
   assert.equal(drawn.length, 66, "33 points for each of two contacts");
   await page.getByLabel("Excluded", { exact: true }).fill("cable moved");
@@ -148,7 +148,7 @@ test("Where no pulse fits a contact, or nothing is one, the page says why", asyn
   await page.goto(url("#/materials/soft_rubber/measure"));
   await page.getByRole("button", { name: "Add trace" }).click();
   await choose(page, folder, "saturated.csv", csv(pulses(1e-3).map(([time, force]) => [time, Math.min(force, 2.5)])));
-  await says(main(page), /Contacts detected: 2; 2\.5 N at .*, the trace differs from every pulse .*; \S+ N at 400 ms, T_c/);
+  await says(main(page), /Contacts detected: 2; 2\.5 N at .*, the trace differs from every pulse .*; \S+ N at 400 ms, contact time/);
   await choose(page, folder, "still.csv", csv(pulses(1e-3).slice(150, 390).map(([time, force]) => [time - 0.15, force])));
   await says(main(page), /Contacts detected: 0; no force exceeds the threshold/);
 });

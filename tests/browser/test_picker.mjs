@@ -23,7 +23,7 @@ test("A material is chosen by keyboard and its page gives k_b and c_b with their
   const buffers = page.getByRole("group", { name: "Buffers" });
   await says(buffers, /k_?b 2\.895 ± 0\.3 kN\/m, c_?b 12\.32 ± 1\.2 N s\/m, ζ 0\.3579 ± 0\.026/);
   await says(buffers, /Measured from 0\.2 .*to 0\.8 m\/s/);
-  await says(list.locator("option:checked"), /Felt: e 0\.3, T_c 20 ms, draft/);
+  await says(list.locator("option:checked"), /Felt: e 0\.3, contact time 20 ms, draft/);
   assert.equal((await sceneOf(page)).dampers[0].buffer, "felt");
   await page.getByRole("combobox", { name: "Revision" }).selectOption({ label: "@1, draft" });
   assert.equal((await sceneOf(page)).dampers[0].buffer, "felt@1");
@@ -34,7 +34,7 @@ test("Own numbers begin with the material's, and what they come to follows", asy
   await page.goto(url("#/scene"));
   const buffers = page.getByRole("group", { name: "Buffers" });
   await says(buffers, /k_?b 1\.656 kN\/m/);
-  await buffers.getByRole("combobox", { name: "Material" }).selectOption({ label: "own e and T_c" });
+  await buffers.getByRole("combobox", { name: "Material" }).selectOption({ label: "own e and contact time" });
   assert.equal(await buffers.getByLabel("Restitution").inputValue(), "0.61");
   await buffers.getByLabel("Restitution").fill("0.2");
   await says(buffers, /k_?b 2\.04 kN\/m/);
@@ -48,7 +48,7 @@ test("Both sides get buffers of their own, and one again", async ({ newPage, url
   await page.goto(url("#/scene"));
   await page.getByLabel("The same on both sides").uncheck();
   await page.getByRole("group", { name: "Right buffer" }).getByRole("combobox", { name: "Material" })
-    .selectOption({ label: "Aluminium: e 0.46, T_c 300 µs, approved" });
+    .selectOption({ label: "Aluminium: e 0.46, contact time 300 µs, approved" });
   await says(page.getByRole("group", { name: "Right buffer" }), /k_?b 1[\d.]+ MN\/m/);
   const [damper] = (await sceneOf(page)).dampers;
   assert.deepEqual([damper.left_buffer, damper.right_buffer, damper.buffer], ["sponge", "aluminium", undefined]);

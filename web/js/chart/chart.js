@@ -12,7 +12,7 @@ import { ChartTools, DataTable } from "./export.js";
 import { handleKey, handlePointers } from "./input.js";
 import { Markers, Rules, Spans, uprightLabels } from "./marks.js";
 import { extentOf, linearScale, logScale, paddedDomain } from "./scale.js";
-import { drawSeries, valuesInView } from "./series.js";
+import { drawSeries, ink, valuesInView } from "./series.js";
 
 export const MARGIN = { left: 58, right: 14, top: 8, bottom: 22, marks: 14 };
 
@@ -195,7 +195,7 @@ function Drawn(props) {
         />`
       }
     </div>
-    ${!isCompact && !isShort && html`<p class="x-title" aria-hidden="true">${xTitle}</p>`}
+    ${!isCompact && !isShort && html`<p class="x-title" aria-hidden="true">${withSubscripts(xTitle)}</p>`}
     <p class="visually-hidden" id=${`${id}-summary`}>${summary}</p>
     ${hasNumbers && html`<${DataTable} title=${title} series=${props.series} x=${x} y=${y} />`}`;
 }
@@ -238,7 +238,7 @@ function Legend({ series, hidden, setHidden }) {
         class="legend-item"
         aria-pressed=${!hidden.has(label)}
         title="Click: hide or show. Double click: show it alone."
-        style=${{ "--ink": `var(--${one.color ?? "accent"})` }}
+        style=${{ "--ink": ink(one.color) }}
         onClick=${(event) => toggle(label, event)}
         onDblClick=${() => isolate(label)}
       >

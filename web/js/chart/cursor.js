@@ -2,7 +2,7 @@
 import { html, useLayoutEffect, useRef, useState } from "../ui/preact.js";
 import { createStore, useStore } from "../ui/store.js";
 import { quantity } from "../units.js";
-import { nearestIndex } from "./series.js";
+import { ink, nearestIndex } from "./series.js";
 
 const groups = new Map();
 
@@ -70,7 +70,7 @@ export function Cursor({ id, cursor, series, markers, plot, x, y }) {
             cx=${plot.x.to(one.x)}
             cy=${plot.y.to(one.y)}
             r="3.5"
-            style=${{ "--ink": `var(--${one.series.color ?? "accent"})` }}
+            style=${{ "--ink": ink(one.series.color) }}
           />`,
       )}
     </svg>
@@ -82,7 +82,7 @@ export function Cursor({ id, cursor, series, markers, plot, x, y }) {
           .slice(0, 12)
           .map(
             (one) =>
-              html`<div style=${{ "--ink": `var(--${one.series.color ?? "accent"})` }}>
+              html`<div style=${{ "--ink": ink(one.series.color) }}>
                 <span class="swatch line"></span>${one.series.label} <output>${one.text}</output>
               </div>`,
           )}

@@ -1,9 +1,10 @@
 // What can be taken from a chart: its picture (PNG, SVG) and its numbers.
 import { html } from "../ui/preact.js";
-import { fileName, pngBlob, saveBlob, standaloneSvg, svgBlob } from "../ui/files.js";
+import { fileName, plainColor, pngBlob, saveBlob, standaloneSvg, svgBlob } from "../ui/files.js";
 import { CopyButton, IconButton } from "../ui/controls.js";
 import { axisUnit } from "./axis.js";
 import { number, pretty } from "../units.js";
+import { ink } from "./series.js";
 
 const HEAD = 34; // pixels above the plot: heading and legend
 const SVG = "http://www.w3.org/2000/svg";
@@ -19,8 +20,8 @@ function element(name, attributes, text) {
 // The variable's colour as this theme has it: a computed value, unlike the pair of light-dark().
 function themeColor(name) {
   const probe = document.body.appendChild(document.createElement("span"));
-  probe.style.color = `var(--${name})`;
-  const found = getComputedStyle(probe).color;
+  probe.style.color = ink(name);
+  const found = plainColor(getComputedStyle(probe).color);
   probe.remove();
   return found;
 }
@@ -51,8 +52,8 @@ function picture(svg, heading, series) {
       ),
     );
     x -= one.label.length * 6.6 + 8;
-    const ink = themeColor(one.color ?? "accent");
-    whole.append(element("rect", { x: x - 12, y: 13, width: 14, height: 3, fill: ink }));
+    const fill = themeColor(one.color);
+    whole.append(element("rect", { x: x - 12, y: 13, width: 14, height: 3, fill }));
     x -= 26;
   }
   plot.setAttribute("y", HEAD);

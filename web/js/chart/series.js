@@ -125,7 +125,7 @@ function barsPath(xs, ys, widths, xScale, yScale) {
 }
 
 // A colour is the name of a variable of style.css.
-const ink = (series) => ({ "--ink": `var(--${series.color ?? "accent"})` });
+const inkOf = (series) => ({ "--ink": ink(series.color) });
 
 // Paths of lines as they were last drawn: while a scene is edited some charts are drawn again unchanged.
 const paths = new WeakMap();
@@ -142,32 +142,32 @@ const drawings = {
   line: (series, x, y, density) =>
     html`<path
       class="line"
-      style=${{ ...ink(series), strokeWidth: series.lineWidth ?? null }}
+      style=${{ ...inkOf(series), strokeWidth: series.lineWidth ?? null }}
       stroke-dasharray=${series.dash ? "5 4" : null}
       d=${linePathOf(series, x, y, density)}
     />`,
   band: (series, x, y) =>
     html`<path
       class="band"
-      style=${ink(series)}
+      style=${inkOf(series)}
       d=${bandPath(series.x, series.low, series.high, x, y)}
     />`,
   points: (series, x, y) =>
     html`<path
       class="points"
-      style=${{ ...ink(series), strokeWidth: series.size ?? null }}
+      style=${{ ...inkOf(series), strokeWidth: series.size ?? null }}
       d=${pointsPath(series.x, series.y, x, y)}
     />`,
   errors: (series, x, y) =>
     html`<path
       class="errors"
-      style=${ink(series)}
+      style=${inkOf(series)}
       d=${errorsPath(series.x, series.low, series.high, x, y)}
     />`,
   bars: (series, x, y) =>
     html`<path
       class="bars"
-      style=${ink(series)}
+      style=${inkOf(series)}
       d=${barsPath(series.x, series.y, series.width, x, y)}
     />`,
 };
@@ -196,4 +196,12 @@ export function nearestIndex({ x: xs }, x) {
   }
   const after = Math.min(xs.length - 1, indexAtLeast(xs, x));
   return after > 0 && x - xs[after - 1] < xs[after] - x ? after - 1 : after;
+}
+
+// "force" is that colour, "force 0" to "force 1" its shades from light to dark.
+export function ink(name = "accent") {
+  const [base, place] = name.split(" ");
+  if (place === undefined) return `var(--${base})`;
+  const far = Math.round(90 * Math.abs(place - 0.5));
+  return `color-mix(in srgb, var(--${base}), var(--${place < 0.5 ? "front" : "text"}) ${far}%)`;
 }

@@ -157,7 +157,7 @@ export function ChoiceField({ pointer, schema, label, required, draft, choices, 
     isWide=${isWide}
     control=${(attributes) =>
       html`<select ...${attributes} value=${now} onChange=${change}>
-        ${all.map(([one, text]) => html`<option key=${one} value=${one} selected=${one === now}>${text}</option>`)}
+        ${all.map(([one, text]) => html`<option key=${one} value=${one} selected=${one === now}>${pretty(text)}</option>`)}
       </select>`}
   />`;
 }

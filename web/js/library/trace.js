@@ -32,7 +32,8 @@ function contactText({ contact, contact_time: time, restitution, note }) {
     parts.push(
       `${quantity(contact.peak, "N", 3)} at ${quantity(contact.start ?? contact.first, "s", 3)}`,
     );
-  if (time !== null) parts.push(`T_c ${quantity(time, "s", 3)}, e ${number(restitution, 3)}`);
+  if (time !== null)
+    parts.push(`contact time ${quantity(time, "s", 3)}, e ${number(restitution, 3)}`);
   if (note) parts.push(note);
   return parts.join(", ");
 }

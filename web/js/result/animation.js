@@ -274,26 +274,28 @@ export function Animation() {
       <div class="drawing" ref=${box}>
         ${layout && html`<${Picture} model=${model} layout=${layout} state=${state ?? { displacements: [] }} peak=${peak} trail=${state && hasTrail && motion.trailAt(t, pace)} />`}
       </div>
-      <${FilmTools}
-        scene=${{ model, stroke, peak, hasTrail }}
-        frame=${() => frameAt(t)}
-        frameAt=${frameAt}
-        window=${window}
-        t=${t}
-        pace=${pace}
-        signal=${context.signal}
-      />
-      <input
-        type="range"
-        aria-label="Instant"
-        aria-valuetext=${time}
-        min=${window.from}
-        max=${window.to}
-        step=${(window.to - window.from) / 1000}
-        value=${t}
-        onInput=${(event) => player.scrub(event.currentTarget.value)}
-        onChange=${player.note}
-      />
+      <div class="player-time">
+        <input
+          type="range"
+          aria-label="Instant"
+          aria-valuetext=${time}
+          min=${window.from}
+          max=${window.to}
+          step=${(window.to - window.from) / 1000}
+          value=${t}
+          onInput=${(event) => player.scrub(event.currentTarget.value)}
+          onChange=${player.note}
+        />
+        <${FilmTools}
+          scene=${{ model, stroke, peak, hasTrail }}
+          frame=${() => frameAt(t)}
+          frameAt=${frameAt}
+          window=${window}
+          t=${t}
+          pace=${pace}
+          signal=${context.signal}
+        />
+      </div>
       <div class="player-tools">
         <button type="button" class="primary" onClick=${() => player.play(!isPlaying)}>
           ${isPlaying ? "Pause" : "Play"}

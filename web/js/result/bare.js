@@ -1,5 +1,5 @@
 // The same structure without its dampers: the motion that the damper is judged by.
-import { post } from "../api.js";
+import { preview } from "../scene/preview.js";
 import { useLoaded } from "../ui/store.js";
 
 const MOST_POINTS = 20000;
@@ -19,7 +19,7 @@ export function useBare(result, channel) {
       const { study, contact, accuracy, ...rest } = scene; // without contacts the exact solver is right and fast
       const bare = { ...rest, dampers: [], output: { channels: [name], impacts: false } };
       try {
-        const answer = await post(`v1/preview?points=${MOST_POINTS}`, bare, { signal });
+        const answer = await preview({ scene: bare, points: MOST_POINTS }, signal);
         const { start, count, bucket = 1, sample_rate: rate, channels } = answer.series;
         const { values, min: low, max: high } = channels[name];
         const time = Float64Array.from(

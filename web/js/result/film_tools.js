@@ -1,16 +1,18 @@
 // The animation to take along: the frame as PNG, the window as a film, whose progress is shown and which can be cancelled.
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
-import { LONGEST, saveFilm, saveFrame } from "../scene/film.js";
-import { canRecord } from "../scene/video.js";
+import { LONGEST, canRecord, saveFilm, saveFrame } from "../scene/film.js";
 import { announce } from "../ui/announce.js";
 import { Failure, IconButton } from "../ui/controls.js";
 import { number } from "../units.js";
+
+const DOUBLE_CLICK = 700; // ms
 
 // `frame()` and `frameAt(t)` are {state, trail, text} or null; `pace` is seconds on the screen for one of the motion.
 export function FilmTools({ scene, frame, frameAt, window, t, pace, signal }) {
   const [progress, setProgress] = useState(null);
   const [error, setError] = useState(null);
   const stop = useRef(null);
+  const began = useRef(0);
   useEffect(() => {
     const cancel = () => stop.current?.abort();
     signal.addEventListener("abort", cancel);
@@ -26,6 +28,7 @@ export function FilmTools({ scene, frame, frameAt, window, t, pace, signal }) {
   const seconds = Math.min(LONGEST, whole);
   const film = async () => {
     stop.current = new AbortController();
+    began.current = performance.now();
     setError(null);
     setProgress(0);
     try {
@@ -43,19 +46,25 @@ export function FilmTools({ scene, frame, frameAt, window, t, pace, signal }) {
     }
     setProgress(null);
   };
-  if (progress !== null)
-    return html`<div class="film-tools">
-      <progress max="1" value=${progress} aria-label="Film"></progress>
-      <span>${`${number(progress * seconds, 2)} of ${number(seconds, 3)} s`}</span>
-      <${IconButton} label="Cancel the film" onClick=${() => stop.current.abort()}>Cancel<//>
-    </div>`;
+  // One button for both, so that it keeps the focus; the second click of a double one does not cancel.
+  const isFilming = progress !== null;
+  const press = () => {
+    if (!isFilming) film();
+    else if (performance.now() - began.current > DOUBLE_CLICK) stop.current.abort();
+  };
+  const label = isFilming ? "Cancel the film" : `Save as WebM: a film of ${number(seconds, 3)} s`;
   return html`<div class="film-tools">
-    <${IconButton} label="Save the frame as PNG" onClick=${savePng}>PNG<//>
+    <div>
+      ${
+        isFilming
+          ? html`<progress max="1" value=${progress} aria-label="Film"></progress>
+              <span>${`${number(progress * seconds, 2)} of ${number(seconds, 3)} s`}</span>`
+          : html`<${IconButton} label="Save the frame as PNG" onClick=${savePng}>PNG<//>`
+      }
+    </div>
     ${
       canRecord() &&
-      html`<${IconButton} label=${`Save as WebM: a film of ${number(seconds, 3)} s`} onClick=${film}
-        >WebM<//
-      >`
+      html`<${IconButton} label=${label} onClick=${press}>${isFilming ? "Cancel" : "WebM"}<//>`
     }
     ${error && html`<${Failure} error=${error} />`}
   </div>`;

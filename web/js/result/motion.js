@@ -33,7 +33,12 @@ export const quantityColor = (channel) =>
   })[channel.replace(/_\d+$/, "")] ?? "accent";
 
 const wordOf = (channel) => channel.replace(/_\d+$/, "");
-const numberOf = (channel) => /_(\d+)$/.exec(channel)?.[1];
+
+// Whose channel it is: "storey 2", "damper 1".
+const ownerOf = (channel) =>
+  channel.replace(/^(damper|contact|penetration)?.*_(?=\d+$)/, (_, damper) =>
+    damper ? "damper " : "storey ",
+  );
 
 // The charts of a result: {key, title, unit, channels, kind}. "relative" is the free mass as the structure sees it.
 function chartsOf(result) {
@@ -71,7 +76,7 @@ const usual = (charts, { plan }) =>
     .filter(
       ({ key }) =>
         key === "displacement" ||
-        key === "relative_1" ||
+        /^relative_[12]$/.test(key) ||
         (key === "contact_force" && plan.contact_model !== "impulse"),
     )
     .map(({ key }) => key);
@@ -112,14 +117,15 @@ function seriesFor(chart, { time, columns }, bare) {
   const drawn = picked(chart.channels);
   const ghost = chart.key === "displacement" && bare !== null;
   const series = drawn.map((channel, at) => {
-    const color = drawn.length > 1 ? `c${at + 1}` : quantityColor(channel);
+    const shade = drawn.length > 1 ? ` ${at / (drawn.length - 1)}` : "";
     const single = ghost ? "with the damper" : words(chart.key);
-    const label = drawn.length > 1 ? `${words(chart.key)} ${numberOf(channel) ?? at + 1}` : single;
-    return seriesOf(label, color, time, columns.get(channel));
+    const label = drawn.length > 1 ? ownerOf(channel) : single;
+    return seriesOf(label, quantityColor(channel) + shade, time, columns.get(channel));
   });
   if (!ghost) return series;
-  const storey = drawn.length > 1 ? ` (${numberOf(drawn.at(-1))})` : "";
-  return [seriesOf(`without damper${storey}`, "ghost", bare.time, bare.column), ...series];
+  const bareLabel =
+    drawn.length > 1 ? `${ownerOf(drawn.at(-1))} without dampers` : "without damper";
+  return [seriesOf(bareLabel, "ghost", bare.time, bare.column), ...series];
 }
 
 export function Motion({ onDrawn }) {

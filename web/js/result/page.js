@@ -3,7 +3,7 @@ import { html, useMemo, useState } from "../ui/preact.js";
 import { link } from "../address.js";
 import { get } from "../api.js";
 import { sceneName } from "../runs/scene_name.js";
-import { Failure, Loaded } from "../ui/controls.js";
+import { Failure, Loaded, withSubscripts } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { useLoaded } from "../ui/store.js";
 import { jobsOf } from "./context.js";
@@ -27,7 +27,7 @@ function ResultPage({ address, signal }) {
   const View = isStudy ? study.data?.StudyView : ResultView;
   return html`<div class="result">
     <div class="title-row">
-      <h1>${name}</h1>
+      <h1>${withSubscripts(name)}</h1>
       ${
         loaded.data &&
         html`<div class="actions">

@@ -84,7 +84,7 @@ function Report({ result, job, jobs, version, schema, View, signal }) {
     ({ detail }) => html`<li>${withSubscripts(sentence(readable(detail)))}</li>`,
   );
   return html`<${ResultContext.Provider} value=${context}>
-    <h1>${job?.title ?? "Result"}</h1>
+    <h1>${pretty(job?.title ?? "Result")}</h1>
     <p class="quiet">
       ${`Computed ${moment(job?.finished)} by impactd ${version.version}, engine ${result.engine}. `}
       <a href=${link(`results/${result.id}`)}>${`Result ${brief(result.id)}`}</a>

@@ -1,6 +1,6 @@
 // Names that tell runs apart: their own titles, else what differs in their scenes.
 import { get, schema as schemaNamed } from "../api.js";
-import { capital, moment, words } from "../units.js";
+import { capital, moment, pretty, words } from "../units.js";
 import { materialOf, valueText } from "./scene_name.js";
 import { unitAt, valuesOf } from "../scene/inputs.js";
 
@@ -54,7 +54,7 @@ export function differingNames(jobs, schema, mostParts = MOST_PARTS, isBelowTitl
 // is what differs. `jobs` are {id, title, scene, result}.
 export function namesOf(jobs, schema) {
   const names = new Map();
-  const groups = Map.groupBy(jobs, ({ title }) => title ?? "");
+  const groups = Map.groupBy(jobs, ({ title }) => pretty(title));
   for (const [title, group] of groups) {
     const isAlone = title !== "" && new Set(group.map(({ result, id }) => result ?? id)).size === 1;
     const found = isAlone ? [] : differingNames(group, schema, MOST_PARTS, title !== "");

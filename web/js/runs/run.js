@@ -7,7 +7,7 @@ import { pageOf } from "../ui/page.js";
 import { Sweep } from "../study/sweep.js";
 import { html, useEffect, useReducer, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
-import { moment, number } from "../units.js";
+import { moment, number, pretty } from "../units.js";
 import { isOpen, StateBadge } from "./actions.js";
 
 const timeText = (seconds) =>
@@ -59,7 +59,7 @@ function Run({ first, path, signal }) {
     change.current.focus();
     announce("Cancelled");
   };
-  return html`<h1>${job.title ?? `A ${job.study ?? "run"} without a title`}</h1>
+  return html`<h1>${pretty(job.title ?? `A ${job.study ?? "run"} without a title`)}</h1>
     <section class="panel" aria-label="State">
       <p>
         <${StateBadge}

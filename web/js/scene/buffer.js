@@ -15,7 +15,7 @@ const WAYS = {
     stiffness: stiffness ?? 1e4,
     ...(exponent ? { restitution } : { damping: damping ?? 1 }),
   }),
-  "own e and T_c": ({ restitution, contact_time: time }) => ({
+  "own e and contact time": ({ restitution, contact_time: time }) => ({
     restitution: restitution ?? 0.6,
     contact_time: time ?? 0.02,
   }),
@@ -23,14 +23,14 @@ const WAYS = {
 
 function wayOf(buffer) {
   if (buffer?.constructor !== Object || buffer.material) return undefined;
-  return "stiffness" in buffer ? "own stiffness" : "own e and T_c";
+  return "stiffness" in buffer ? "own stiffness" : "own e and contact time";
 }
 
 function materialText({ name, table, restitution, contact_time: time, status }) {
   const numbers =
     table.length > 0
-      ? `e and T_c at ${table.length} speeds`
-      : `e ${restitution ?? "–"}, T_c ${quantity(time, "s")}`;
+      ? `e and contact time at ${table.length} speeds`
+      : `e ${restitution ?? "–"}, contact time ${quantity(time, "s")}`;
   return `${name}: ${numbers}, ${status}`;
 }
 
@@ -135,7 +135,9 @@ function DerivedValues({ stop, found }) {
       ? range(first?.[name].value, last?.[name].value, unit)
       : figure(stop[name], (isSame && first[name].uncertainty) || null, unit);
   const text = `k_b ${value("stiffness", "N/m")}, c_b ${value("damping", "N s/m")}, ζ ${value("damping_ratio")} for an effective mass of ${quantity(stop.effective_mass, "kg")}`;
-  return html`<p>${text}${isSame && first.stiffness.uncertainty ? " (± one deviation)" : ""}</p>
+  return html`<p>
+      ${withSubscripts(text)}${isSame && first.stiffness.uncertainty ? " (± one deviation)" : ""}
+    </p>
     ${
       first &&
       html`<details>

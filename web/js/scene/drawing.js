@@ -6,16 +6,15 @@ import { layoutOf, roundDown } from "./layout.js";
 import { limit } from "./model.js";
 import {
   Ball,
-  columnPath,
   Dashpot,
   Dimension,
   Force,
   Hatched,
-  px,
   Shaking,
   Spring,
+  columnPath,
+  px,
 } from "./parts.js";
-import { Trail } from "./trail.js";
 
 const FORCE = 44; // pixels of the largest force's arrow
 
@@ -264,4 +263,31 @@ export function Picture({ model, layout, state = {}, peak = 0, trail, svgRef }) 
     ${!isSingle && slabs.map((slab) => html`<${StoreyLabels} slab=${slab} model=${model} layout=${layout} />`)}
     <${Foot} model=${model} layout=${layout} />
   </svg>`;
+}
+
+const PIECES = 6; // of a line, each fainter than the one before
+
+function Line({ points, name }) {
+  const size = Math.ceil(points.length / PIECES);
+  return Array.from({ length: PIECES }, (_, at) => {
+    const part = points.slice(at * size, (at + 1) * size + 1);
+    if (part.length < 2) return null;
+    const d = part.map(([x, y], index) => `${index === 0 ? "M" : "L"}${px(x)} ${px(y)}`).join("");
+    return html`<path class=${name} d=${d} stroke-opacity=${px(0.9 * (1 - at / PIECES))} />`;
+  });
+}
+
+// `trail` is {span, states: [{age, displacements, positions}]}, the newest first.
+export function Trail({ trail, model, layout }) {
+  const { span, states } = trail;
+  const { top, middle, scale, trail: height } = layout;
+  const highest = model.storeys[0].index;
+  const own = model.dampers.filter(({ storey }) => storey === highest);
+  const y = (age) => top - (age / span) * height;
+  const xOf = (state) => middle + state.displacements[highest] * scale;
+  const line = (place) => states.map((state) => [xOf(state) + place(state) * scale, y(state.age)]);
+  return html`<g class="trail">
+    <${Line} points=${line(() => 0)} name="trail-structure" />
+    ${own.map(({ index }) => html`<${Line} points=${line((state) => state.positions[index])} name="trail-ball" />`)}
+  </g>`;
 }

@@ -1,9 +1,8 @@
 // Pictures of a motion to take along: a frame as PNG, a stretch of time as WebM. They are drawn aside, with all words.
-import { saveBlob } from "../ui/files.js";
+import { saveBlob, standaloneSvg, svgBlob } from "../ui/files.js";
 import { html, render } from "../ui/preact.js";
 import { Picture } from "./drawing.js";
 import { layoutOf } from "./layout.js";
-import { framePng, record } from "./video.js";
 
 const WIDTH = 640;
 const TRAIL = 60; // pixels
@@ -62,4 +61,103 @@ export async function saveFilm(scene, { seconds, frameAt, name, onProgress, sign
   } finally {
     stage.remove();
   }
+}
+
+const RATE = 30; // frames per second
+const PIXELS = 2; // of the canvas for one of the drawing
+
+const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+const typeHere = () => TYPES.find((type) => globalThis.MediaRecorder?.isTypeSupported(type));
+export const canRecord = () => Boolean(typeHere());
+
+const colorOf = (node) => getComputedStyle(node).color;
+
+// Paints the SVG element as it is now, with a line of text below it.
+async function paint(context, svg, text, colors) {
+  const { canvas } = context;
+  const copy = standaloneSvg(svg);
+  const url = URL.createObjectURL(svgBlob(copy));
+  try {
+    const image = new Image();
+    image.src = url;
+    await image.decode();
+    context.fillStyle = colors.back;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(
+      image,
+      0,
+      0,
+      svg.width.baseVal.value * PIXELS,
+      svg.height.baseVal.value * PIXELS,
+    );
+    context.fillStyle = colors.text;
+    context.font = `${13 * PIXELS}px Inter, sans-serif`;
+    context.fillText(text, 8 * PIXELS, canvas.height - 9 * PIXELS);
+  } finally {
+    URL.revokeObjectURL(url);
+  }
+}
+
+// A canvas of the drawing's size with room for a line of text, and what paints it.
+function stageFor(svg, host) {
+  const even = (pixels) => 2 * Math.ceil(pixels / 2); // as encoders want it
+  const canvas = document.createElement("canvas");
+  canvas.width = even(svg.width.baseVal.value * PIXELS);
+  canvas.height = even((svg.height.baseVal.value + 28) * PIXELS);
+  const context = canvas.getContext("2d", { alpha: false });
+  const probe = host.appendChild(document.createElement("span"));
+  probe.style.color = "var(--front)";
+  const back = colorOf(probe);
+  probe.style.color = "var(--text)";
+  const colors = { back, text: colorOf(probe) };
+  probe.remove();
+  return { canvas, paint: (text) => paint(context, svg, text, colors) };
+}
+
+// The frame as it is, as a PNG.
+export async function framePng(svg, text) {
+  const { canvas, paint: draw } = stageFor(svg, svg.parentElement);
+  await draw(text);
+  return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
+}
+
+// Records `seconds` of film: pose(second) puts the drawing there and returns the line of text, or null while it waits for
+// data. The film as a blob; null once the signal has ended it.
+export async function record({ svg, seconds, pose, onProgress, signal }) {
+  const { canvas, paint: draw } = stageFor(svg(), svg().parentElement);
+  const track = canvas.captureStream(RATE);
+  const recorder = new MediaRecorder(track, { mimeType: typeHere(), videoBitsPerSecond: 6e6 });
+  const chunks = [];
+  recorder.ondataavailable = ({ data }) => data.size > 0 && chunks.push(data);
+  const ended = new Promise((resolve) => recorder.addEventListener("stop", resolve));
+  const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+  let waited = 0; // ms in which the film stood still
+  const textAt = async (second) => {
+    for (;;) {
+      const text = pose(second);
+      if (text !== null || signal.aborted) return text;
+      if (recorder.state === "recording") recorder.pause();
+      const began = performance.now();
+      await wait(40);
+      waited += performance.now() - began;
+    }
+  };
+  await draw((await textAt(0)) ?? "");
+  recorder.start(250);
+  waited = 0;
+  const began = performance.now();
+  for (let second = 0; second < seconds && !signal.aborted;) {
+    const text = await textAt(second);
+    if (signal.aborted) break;
+    if (recorder.state === "paused") recorder.resume();
+    await draw(text);
+    onProgress(second / seconds);
+    const next = performance.now() - began - waited;
+    await wait(Math.max(0, second * 1000 + 1000 / RATE - next));
+    second = (performance.now() - began - waited) / 1000;
+  }
+  recorder.stop();
+  for (const one of track.getTracks()) one.stop();
+  await ended;
+  return signal.aborted ? null : new Blob(chunks, { type: "video/webm" });
 }

@@ -1,9 +1,12 @@
 // Handles on the drawing of a scene that is edited: what is dragged, or moved by arrow keys, changes the scene.
-import { html, useRef } from "../ui/preact.js";
+import { html, useRef, useState } from "../ui/preact.js";
 import { number, quantity } from "../units.js";
-import { endsOf } from "./drawing.js";
-import { limit } from "./model.js";
+import { Picture, endsOf } from "./drawing.js";
+import { MOST_DAMPERS, MOST_STOREYS, limit, modelOf } from "./model.js";
 import { px } from "./parts.js";
+import { useNews } from "../form/draft.js";
+import { useWidth } from "../ui/width.js";
+import { layoutOf } from "./layout.js";
 
 const STEP = 1.05; // of an arrow key: a ratio
 const E_STEP = 0.02; // of a restitution
@@ -95,7 +98,7 @@ function startHandle({ draft, model, layout }) {
   const given = draft.get(pointer);
   const { scale, middle, wide, slabs } = layout;
   const top = model.start;
-  if (!(scale > 0) || top === 0 || given === undefined) return null;
+  if (!(scale > 0) || given === undefined || (top === 0 && Array.isArray(given))) return null;
   const set = (value) => {
     const next = tidy(value);
     const part = next / top;
@@ -109,14 +112,14 @@ function startHandle({ draft, model, layout }) {
   const [{ y }] = slabs;
   return {
     name: "Start",
-    x: middle + top * scale + (top > 0 ? wide / 2 : -wide / 2),
+    x: middle + top * scale + (top >= 0 ? wide / 2 : -wide / 2),
     y: y + 14,
     value: top,
     valueText: quantity(top, "m"),
     cursor: "ew-resize",
     begin: () => top,
     drag: (start, dx) => set(start + dx / scale),
-    press: (right, up) => set(top * STEP ** (Math.sign(top) * right + up)),
+    press: (right, up) => set(top * STEP ** (Math.sign(top) * right + up) || 0.001 * (right + up)),
   };
 }
 
@@ -225,4 +228,30 @@ export function Handles({ edit, model, layout }) {
         </g>`,
     )}
   </svg>`;
+}
+
+// While something is dragged the scale stays what it was.
+export function SceneDrawing({ draft, history }) {
+  useNews(draft);
+  const box = useRef(null);
+  const width = useWidth(box, 250, 720);
+  const [fixed, setFixed] = useState(null);
+  const model = modelOf(draft.scene, draft.check?.plan);
+  const layout = width > 0 && layoutOf(model, { width, fixed });
+  const onDrag = (isDragging) => setFixed(isDragging ? layout.scale : null);
+  const cut = model.isCut
+    ? ` At most ${MOST_STOREYS} storeys and ${MOST_DAMPERS} dampers are drawn.`
+    : "";
+  return html`<div class="drawing" ref=${box}>
+    ${
+      layout &&
+      html`<div class="drawing-stage">
+        <${Picture} model=${model} layout=${layout} />
+        <${Handles} edit=${{ draft, history, onDrag }} model=${model} layout=${layout} />
+      </div>`
+    }
+    <p class="hint">
+      ${`Drag a stop, the ball's rim, a pad (e up, contact time to the side) or the start. Lengths are to scale.${cut}`}
+    </p>
+  </div>`;
 }

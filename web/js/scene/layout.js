@@ -1,6 +1,7 @@
 // Where the parts of a drawing are, in pixels, and how many pixels a metre has: displacements and clearances share the scale.
 import { limit } from "./model.js";
 
+const NOTHING = 0.02; // m that there is room for where nothing has a length
 const STEPS = [7, 5, 3, 2, 1.5, 1]; // a scale is one of them times a power of ten
 const WALL = 16; // a hatched wall or ground is thick
 const SPRING = 62; // the shortest that the spring of one mass becomes
@@ -20,8 +21,9 @@ const ROWS = {
 
 function scaleFor(model, { room, least, stroke, fixed }) {
   if (fixed) return fixed;
-  const reach = Math.max(0, ...model.dampers.map((one) => one.reach));
   const far = stroke ?? model.far;
+  const longest = Math.max(0, ...model.dampers.map((one) => one.reach));
+  const reach = longest || (far > 0 ? 0 : NOTHING);
   const most = Math.min((room - least) / (reach + 2 * far), (room * 0.42) / reach);
   return most > 0 && most < 1e12 ? roundDown(most, STEPS) : 0;
 }

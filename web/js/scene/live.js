@@ -1,35 +1,31 @@
 // The scene as it is edited, running: sliders for what matters most, the damper's effect, and the motion as it changes.
-import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
+import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
-import { IconButton } from "../ui/controls.js";
 import { useNews } from "../form/draft.js";
 import { number, quantity } from "../units.js";
 import { limit } from "./model.js";
 import { isObject } from "./inputs.js";
-import { bareScene, makePreview, previewScene, samplesOf } from "./preview.js";
+import { bareScene, isTooLong, makePreview, previewScene, samplesOf, tooLong } from "./preview.js";
 
 const SPAN = 5; // a slider goes from a fifth of the value to five times it
 const STEPS = 400;
 const MOST_BUCKET = 0.03; // cycles of the first mode
 const POINTS = [1200, 3000]; // of a preview: as few as show the free mass between its stops
-const MOST_COST = 0.05; // s of processor time that a preview may take
-const TOO_LONG = "This run is too long for a preview; Run shows it.";
 
 // The sliders of a scene: {label, pointer, unit, most}.
 function slidersOf({ dampers, excitation }) {
   const found = [];
   const damper = dampers?.[0];
+  const add = (label, place, unit, most) => {
+    const which = dampers.length > 1 ? ", damper 1" : "";
+    found.push({ label: label + which, pointer: `/dampers/0/${place}`, unit, most });
+  };
   if (isObject(damper)) {
-    found.push({ label: "Clearance", pointer: "/dampers/0/clearance", unit: "m" });
-    found.push({ label: "Free mass", pointer: "/dampers/0/mass", unit: "kg" });
+    add("Clearance", "clearance", "m");
+    add("Free mass", "mass", "kg");
     if (isObject(damper.buffer) && !damper.buffer.material) {
-      found.push({
-        label: "Restitution e",
-        pointer: "/dampers/0/buffer/restitution",
-        unit: "1",
-        most: 1,
-      });
-      found.push({ label: "Contact time", pointer: "/dampers/0/buffer/contact_time", unit: "s" });
+      add("Restitution e", "buffer/restitution", "1", 1);
+      add("Contact time", "buffer/contact_time", "s");
     }
   }
   const units = { displacement: "m", velocity: "m/s" };
@@ -51,9 +47,9 @@ function Slider({ slider, draft }) {
   const value = draft.get(pointer);
   const center = useRef(value);
   const own = useRef(value);
-  if (value !== own.current) center.current = value;
+  if (value !== own.current) center.current = value || center.current || 0.01;
   own.current = value;
-  if (!(value > 0)) return null;
+  if (!(value >= 0)) return null;
   const place = Math.round((Math.log(value / center.current) / Math.log(SPAN)) * STEPS);
   const move = (event) => {
     const next = Number(
@@ -69,7 +65,7 @@ function Slider({ slider, draft }) {
       min=${-STEPS}
       max=${STEPS}
       step="4"
-      value=${place}
+      value=${Math.max(-STEPS, place)}
       aria-label=${`Slide: ${label}`}
       aria-valuetext=${quantity(value, unit)}
       onInput=${move}
@@ -105,7 +101,7 @@ function effectText({ summary }) {
   return parts.join(", ");
 }
 
-const NOTHING = { data: null, error: null, channels: [], damper: null };
+const NOTHING = { data: null, error: null, channels: [], damper: null, name: "" };
 
 // What the service answers to the scene as it is now: {answer, bare}.
 function usePreviews(draft, signal) {
@@ -140,10 +136,10 @@ function usePreviews(draft, signal) {
     return draft.onChange(({ check, isMoving }) => {
       if (isMoving) ask();
       if (!check) return;
-      if (check.cost.cpu_seconds <= MOST_COST) ask();
+      if (!isTooLong(check)) ask();
       else {
         last = "";
-        setAnswer({ ...NOTHING, error: new Error(TOO_LONG) });
+        setAnswer({ ...NOTHING, error: tooLong() });
       }
     });
   }, [draft]);
@@ -157,20 +153,7 @@ function Sliders({ draft }) {
   </div>`;
 }
 
-function Steps({ history }) {
-  const [, redraw] = useReducer((count) => count + 1, 0);
-  useEffect(() => history.onChange(redraw), [history]);
-  return html`<div class="actions">
-    <${IconButton} label="Undo (Ctrl+Z)" disabled=${!history.canUndo} onClick=${history.undo}
-      >Undo<//
-    >
-    <${IconButton} label="Redo (Ctrl+Shift+Z)" disabled=${!history.canRedo} onClick=${history.redo}
-      >Redo<//
-    >
-  </div>`;
-}
-
-export function Live({ draft, history, signal }) {
+export function Live({ draft, signal }) {
   const { answer, bare } = usePreviews(draft, signal);
   const { data, error, damper } = answer;
   return html`<section class="panel live" aria-label="Live">
@@ -179,10 +162,9 @@ export function Live({ draft, history, signal }) {
       <p class="live-effect" role="status">
         ${data && damper ? `With the damper: ${effectText(data)}.` : ""}
       </p>
-      <${Steps} history=${history} />
     </div>
     <${Sliders} draft=${draft} />
-    ${error && html`<p class="hint">${error.status === 422 ? TOO_LONG : error.message}</p>`}
+    ${error && html`<p class="hint">${(error.status === 422 ? tooLong() : error).message}</p>`}
     <${LiveCharts} answer=${answer} bare=${bare} />
   </section>`;
 }
@@ -196,7 +178,7 @@ const wallsOf = ({ offset = 0, clearance }) =>
 
 function LiveCharts({ answer, bare }) {
   const [range, setRange] = useState(null);
-  const { data, channels, damper } = answer;
+  const { data, channels, damper, name } = answer;
   const isComplete = data && channels.every((channel) => data.series.channels[channel]);
   const motion = useMemo(() => isComplete && samplesOf(data, channels[0]), [data]);
   const ghost = useMemo(() => bare && samplesOf(bare.data, bare.channel), [bare]);
@@ -224,9 +206,9 @@ function LiveCharts({ answer, bare }) {
       relative &&
       html`<${Chart}
         ...${shared}
-        title="Free mass between its stops"
+        title=${`${name} between its stops`}
         height=${110}
-        y=${{ label: "Free mass between its stops", unit: "m" }}
+        y=${{ label: `${name} between its stops`, unit: "m" }}
         rules=${wallsOf(damper)}
         series=${[{ label: "free mass", color: "damper", ...relative }]}
       />`

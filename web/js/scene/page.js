@@ -1,20 +1,22 @@
 // A scene: described at the left, drawn and live at the right, run from here.
 import { schema as schemaNamed } from "../api.js";
 import { focusField } from "../form/form.js";
-import { Failure, Help, Loaded, Panel } from "../ui/controls.js";
+import { Failure, Help, IconButton, Loaded, Panel, faultText } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
-import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
 import { useLoaded, useStore } from "../ui/store.js";
 import { Accuracy } from "./accuracy.js";
 import { Buffer } from "./buffer.js";
-import { SceneDrawing } from "./editor.js";
-import { Estimate } from "./estimate.js";
+import { SceneDrawing } from "./handles.js";
 import { ExamplesDialog } from "./examples.js";
-import { JsonView } from "./json.js";
 import { Live } from "./live.js";
 import { RecordField } from "./record_field.js";
 import { makeSession } from "./session.js";
 import { SceneForm } from "./steps.js";
+import { useNews } from "../form/draft.js";
+import { place } from "./inputs.js";
+import { link } from "../address.js";
+import { number, quantity, title, words } from "../units.js";
 
 const WIDGETS = [
   [/^\/dampers.*buffer$/, Buffer],
@@ -57,6 +59,7 @@ function ScenePage({ address, signal }) {
         A free mass between two buffered stops in a structure: change what you like.
       </p>
       <div class="actions">
+        <${Steps} past=${past} />
         <button type="button" onClick=${() => setHasExamples(true)}>Examples</button>
         <${RunButton} session=${session} signal=${signal} />
       </div>
@@ -73,10 +76,21 @@ function ScenePage({ address, signal }) {
       </div>
       <div class="beside">
         <div class="panel drawn"><${SceneDrawing} draft=${draft} history=${past} /></div>
-        <${Live} draft=${draft} history=${past} signal=${signal} />
+        <${Live} draft=${draft} signal=${signal} />
         <${EstimatePanel} session=${session} onGo=${goTo} />
       </div>
     </div>`;
+}
+
+function Steps({ past }) {
+  const [, redraw] = useReducer((count) => count + 1, 0);
+  useEffect(() => past.onChange(redraw), [past]);
+  return html`<${IconButton} label="Undo (Ctrl+Z)" disabled=${!past.canUndo} onClick=${past.undo}
+      >Undo<//
+    >
+    <${IconButton} label="Redo (Ctrl+Shift+Z)" disabled=${!past.canRedo} onClick=${past.redo}
+      >Redo<//
+    >`;
 }
 
 function RunButton({ session, signal }) {
@@ -113,3 +127,99 @@ function EstimatePanel({ session, onGo }) {
 }
 
 export const page = pageOf(() => "Scene", ScenePage);
+
+export function JsonView({ draft }) {
+  const [isOpen, setIsOpen] = useState(false);
+  return html`<details class="panel">
+    <summary onClick=${() => setIsOpen(true)}><h2>The scene as JSON</h2></summary>
+    ${isOpen && html`<${JsonText} draft=${draft} />`}
+  </details>`;
+}
+
+function JsonText({ draft }) {
+  const area = useRef(null);
+  const typed = useRef("");
+  const [fault, setFault] = useState("");
+  useNews(draft, ({ pointer }) => pointer !== undefined);
+  const isTyping = area.current !== null && document.activeElement === area.current;
+  if (!isTyping) typed.current = JSON.stringify(draft.scene, null, 2);
+  const input = (event) => {
+    typed.current = event.currentTarget.value;
+    setFault("");
+    try {
+      draft.replace(Object.assign({}, JSON.parse(typed.current)));
+    } catch (error) {
+      setFault(`No scene yet: ${error.message}`); // browsers name the line
+    }
+  };
+  return html`<p class="fault" role="status">${fault}</p>
+    <textarea
+      class="code"
+      rows="28"
+      spellcheck="false"
+      aria-label="The scene as JSON"
+      ref=${area}
+      value=${typed.current}
+      onInput=${input}
+    ></textarea>`;
+}
+
+// Faults or warnings, each leading to its place by onGo(pointer); the box can take the focus.
+const Places = ({ kind, heading, list, onGo }) =>
+  html`<div class=${`notice ${kind}`} tabindex="-1">
+    <strong>${heading}</strong>
+    <ul>
+      ${list.map(
+        ({ pointer = "", ...fault }) =>
+          html`<li>
+            <button type="button" class="quiet" onClick=${() => onGo(pointer)}>
+              ${title(place(pointer || "/scene"))}</button
+            >${` ${faultText(fault)}`}
+          </li>`,
+      )}
+    </ul>
+  </div>`;
+
+const Figures = ({ pairs }) =>
+  html`<dl class="figures">
+    ${pairs.map(
+      ([label, value]) =>
+        html`<div>
+          <dt>${label}</dt>
+          <dd>${value}</dd>
+        </div>`,
+    )}
+  </dl>`;
+
+function Answer({ answer, onGo }) {
+  const { plan, cost, warnings, cached, result } = answer;
+  const { modes, contact_model: model, solver } = plan;
+  const each = (write) =>
+    modes.slice(0, 3).map(write).join(", ") + (modes.length > 3 ? ` … (${modes.length})` : "");
+  return html`<${Figures}
+      pairs=${[
+        ["Natural frequency", each(({ frequency }) => quantity(frequency, "Hz", 3))],
+        ["Damping ratio", each((mode) => `${number(mode.damping_ratio * 100, 2)} %`)],
+        ["Contact, solver", `${words(model ?? "none")}, ${solver ?? "by target"}`],
+        ["Predicted cost", `${quantity(cost.cpu_seconds, "s", 2)} of CPU`],
+      ]}
+    />
+    ${cached && html`<p>Run before: <a href=${link(`results/${result}`)}>its result</a>.</p>`}
+    ${warnings.length > 0 && html`<${Places} kind="warn" heading="Before you rely on it" list=${warnings} onGo=${onGo} />`}`;
+}
+
+// `outcome` is {answer}, {faults} or {error}, or null.
+export function Estimate({ outcome, onGo }) {
+  if (outcome === null) return null;
+  const { answer, faults, error } = outcome;
+  if (faults)
+    return html`<${Places}
+      kind="bad"
+      heading="To be mended before it runs"
+      list=${faults}
+      onGo=${onGo}
+    />`;
+  return error
+    ? html`<${Failure} error=${error} />`
+    : html`<${Answer} answer=${answer} onGo=${onGo} />`;
+}

@@ -1,5 +1,18 @@
 // What a scene does while it is edited: runs that the service keeps nothing of, one at a time, always the newest scene.
-import { post } from "../api.js";
+import { check, post } from "../api.js";
+import { storeysOf } from "./state.js";
+
+const MOST_COST = 0.05; // s of processor time that a preview may take
+const LARGE = 20; // storeys: such scenes are asked what they cost before they are run
+
+export const isTooLong = ({ cost }) => cost.cpu_seconds > MOST_COST;
+export const tooLong = () => new Error("This run is too long for a preview; Run shows it.");
+
+// A run that the service keeps nothing of.
+export async function preview({ scene, points }, signal) {
+  if (storeysOf(scene) > LARGE && isTooLong(await check(scene))) throw tooLong();
+  return post(`v1/preview?points=${points}`, scene, { signal });
+}
 
 // Keeps asking while scenes come: preview.ask({scene, points, …}); `show({asked, data, error})` after each answer, `asked` being what was
 // asked. Stops with the signal.
@@ -12,8 +25,7 @@ export function makePreview(show, signal) {
     wanted = null;
     isBusy = true;
     try {
-      const path = `v1/preview?points=${asked.points}`;
-      show({ asked, data: await post(path, asked.scene, { signal }), error: null });
+      show({ asked, data: await preview(asked, signal), error: null });
     } catch (error) {
       if (error.name !== "AbortError") show({ asked, data: null, error });
     }
@@ -41,7 +53,12 @@ export function previewScene(scene) {
     name("displacement", storey),
     ...(damper ? [name("damper_displacement", 1)] : []),
   ];
-  return { scene: { ...rest, output: { channels, impacts: false } }, channels, damper };
+  return {
+    scene: { ...rest, output: { channels, impacts: false } },
+    channels,
+    damper,
+    name: dampers.length > 1 ? "Free mass 1" : "Free mass",
+  };
 }
 
 // The same without dampers: the exact solver does, whatever the scene asks for.

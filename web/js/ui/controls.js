@@ -6,6 +6,7 @@ import { reason } from "../api.js";
 import { announce } from "./announce.js";
 import { capital } from "../units.js";
 import { freshId } from "./ids.js";
+import { pretty } from "../units.js";
 
 // A button that is not pressed again while what it did goes on; what fails is shown behind it.
 export function Button({ onClick, isPrimary, isQuiet, disabled, label, title, children }) {
@@ -219,6 +220,9 @@ export function Tabs({ label, tabs, chosen, onChoose }) {
 
 const MOST_BUTTONS = 8;
 
+// Of buttons side by side, about, in pixels.
+const widthOf = (options) => options.reduce((sum, { label }) => sum + 7 * label.length + 22, 60);
+
 // One of many: [{value, label}] as a list that opens.
 const ChoiceList = ({ label, options, value, onChange }) =>
   html`<select
@@ -226,13 +230,13 @@ const ChoiceList = ({ label, options, value, onChange }) =>
     onChange=${(event) => onChange(options[event.currentTarget.selectedIndex].value)}
   >
     ${options.map(
-      (option) => html`<option selected=${option.value === value}>${option.label}</option>`,
+      (option) => html`<option selected=${option.value === value}>${pretty(option.label)}</option>`,
     )}
   </select>`;
 
 // One of a few: [{value, label}] as buttons side by side.
 export const Choice = (props) =>
-  props.options.length > MOST_BUTTONS
+  props.options.length > MOST_BUTTONS || widthOf(props.options) > innerWidth
     ? html`<${ChoiceList} ...${props} />`
     : html`<${ChoiceButtons} ...${props} />`;
 
@@ -250,23 +254,21 @@ const ChoiceButtons = ({ label, options, value, onChange }) =>
     )}
   </div>`;
 
-// Actions behind a button; Escape and a click elsewhere close it.
+// Actions behind a button; Escape, a click and the focus elsewhere close it.
 export function Menu({ label, children }) {
   const [isOpen, setIsOpen] = useState(false);
   const box = useRef(null);
   useLayoutEffect(() => {
     if (!isOpen) return undefined;
     const close = (event) => {
-      const isAway =
-        event.type === "keydown" ? event.key === "Escape" : !box.current.contains(event.target);
-      if (isAway) setIsOpen(false);
+      const isKey = event.type === "keydown";
+      if (isKey ? event.key !== "Escape" : box.current.contains(event.target)) return;
+      if (isKey) box.current.firstElementChild.focus();
+      setIsOpen(false);
     };
-    addEventListener("pointerdown", close);
-    addEventListener("keydown", close);
-    return () => {
-      removeEventListener("pointerdown", close);
-      removeEventListener("keydown", close);
-    };
+    const all = ["pointerdown", "focusin", "keydown"];
+    for (const name of all) addEventListener(name, close);
+    return () => all.forEach((name) => removeEventListener(name, close));
   }, [isOpen]);
   return html`<div class="menu" ref=${box}>
     <button type="button" aria-expanded=${isOpen} onClick=${() => setIsOpen(!isOpen)}>
@@ -276,9 +278,9 @@ export function Menu({ label, children }) {
   </div>`;
 }
 
-// "T_c" as T with the index c.
+// "T_c" as T with the index c, "m/s^2" as "m/s²".
 export const withSubscripts = (text) =>
-  text
+  pretty(text)
     .split(/\b([A-Za-z])_([a-z])\b/)
     .map((part, at) => (at % 3 === 2 ? html`<sub>${part}</sub>` : part));
 

@@ -31,7 +31,7 @@ const PAINT = [
 ];
 
 // Colours of style.css are mixed for the screen; "color(srgb r g b / a)" is not known outside of browsers.
-function plainColor(text) {
+export function plainColor(text) {
   const parts = /^color\(srgb ([\d.e-]+) ([\d.e-]+) ([\d.e-]+)(?: \/ ([\d.]+))?\)$/.exec(text);
   if (!parts) return text;
   const [red, green, blue] = parts.slice(1, 4).map((part) => Math.round(Number(part) * 255));
