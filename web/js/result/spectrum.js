@@ -6,7 +6,7 @@ import { Chart } from "../chart/chart.js";
 import { Choice, Loaded } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
 import { latest } from "../runs/names.js";
-import { brief, moment, number, pretty, words } from "../units.js";
+import { number, pretty, words } from "../units.js";
 import { useResult } from "./context.js";
 
 const MOST_OVERLAYS = 7; // there are 8 colours
@@ -150,15 +150,4 @@ function SpectrumChart({ psd, names, ids, others }) {
       )}
       ${choices.length === 0 && html`<p class="quiet">There is no other result yet.</p>`}
     </details>`;
-}
-
-export async function latest(limit) {
-  const { jobs } = await get("v1/jobs", { status: "successful", kind: "none", limit });
-  const named = jobs.filter(({ result }) => result);
-  return new Map(
-    named.map(({ result, title, finished }) => [
-      result,
-      `${title ?? brief(result)}, ${moment(finished)}`,
-    ]),
-  );
 }
