@@ -7,9 +7,9 @@ import { number, pretty, scale } from "../units.js";
 
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
 
-// The size that a column's unit suits: the largest, or a small one where many are far below that, but for those of rounding.
+// The size that a column's unit suits: the largest, or a small one where many are far below that: not one that is next to nothing.
 function readableSize(sizes, largest) {
-  const sorted = sizes.filter((size) => size > 1e-6 * largest).sort((a, b) => a - b);
+  const sorted = sizes.filter((size) => size > 1e-4 * largest).sort((a, b) => a - b);
   const small = sorted[(sorted.length - 1) >> 2];
   return small < largest / 100 ? small : largest;
 }
