@@ -36,7 +36,7 @@ test("Runs are found by words, state and study, by a URL too, and one is cancell
   await page.getByRole("combobox", { name: "Study" }).selectOption("compare");
   await until("the comparison alone", async () => (await page.getByRole("row").count()) === 2);
   await page.getByRole("combobox", { name: "Study" }).selectOption("");
-  await page.getByLabel("Words").fill("slow");
+  await page.getByLabel("Search").fill("slow");
   await leads(page, /q=slow/);
   await until("the slow one alone", async () => (await page.getByRole("row").count()) === 2);
   const other = await newPage();
@@ -91,7 +91,7 @@ test("Chosen runs are compared, renamed and deleted", async ({ page, daemon, url
   await leads(page, new RegExp(`compare\\?a=${first.result}&b=${second.result}`));
   await page.goBack();
   await page.getByRole("button", { name: "Choose all" }).click();
-  await page.getByLabel("Words").fill("mine 2");
+  await page.getByLabel("Search").fill("mine 2");
   await says(page.getByRole("group", { name: "Chosen runs" }), /1 chosen, 1 more hidden by the filter/);
   await page.getByRole("button", { name: "Delete", exact: true }).click();
   await page.getByRole("button", { name: "Delete for good" }).click();
@@ -110,7 +110,7 @@ test("A page of many runs leads to the older ones and back, and words find older
   await page.getByRole("link", { name: "The oldest of many" }).waitFor();
   await page.goBack();
   await page.getByRole("link", { name: "Run 99." }).waitFor();
-  await page.getByLabel("Words").fill("oldest");
+  await page.getByLabel("Search").fill("oldest");
   await page.getByRole("link", { name: "The oldest of many" }).waitFor();
 });
 

@@ -14,7 +14,7 @@ test("A file is uploaded, a fault told, shakes a scene, and goes again", async (
   await says(page.locator("main"), /There are none yet/);
   await page.getByLabel("File").setInputFiles(file);
   assert.equal(await page.getByLabel("Name").inputValue(), "Valley_7");
-  await page.getByLabel("Unit").selectOption("m/s^2");
+  await page.getByLabel("Unit").selectOption("m/s²");
   await page.getByRole("button", { name: "Upload", exact: true }).click();
   await says(page.getByRole("alert"), /must state the interval/);
   await page.getByLabel("Name").fill("Valley 7");

@@ -38,7 +38,7 @@ test("A sweep over two numbers is contours: colours with numbers, the value unde
   const main = page.getByRole("main");
   await page.goto(url(`#/results/${job.result}`));
   await says(main, /RMS displacement \[mm\]/);
-  await says(main, /Least RMS displacement: [\d.]+ mm at mass [\d.]+ kg, clearance [\d.]+ mm/);
+  await says(main, /Least RMS displacement: [\d.]+ mm at damper mass [\d.]+ kg, clearance [\d.]+ mm/);
   const picture = page.getByRole("application", { name: "RMS displacement", exact: true });
   const { width, height } = await picture.boundingBox();
   await picture.hover({ position: { x: width - 18, y: 14 } });

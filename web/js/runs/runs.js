@@ -176,7 +176,7 @@ const Chooser = ({ name, label, query, values, onChange }) =>
 function Filters({ query, onChange }) {
   return html`<form class="row level" role="search" onSubmit=${(event) => event.preventDefault()}>
     <label class="filter">
-      Words
+      Search
       <input
         name="q"
         type="search"
