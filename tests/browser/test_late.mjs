@@ -42,8 +42,8 @@ test("A search that another page overtook does not come back", async ({ page, ur
   const list = await hold(page, /\/v1\/materials\?/);
   await menu(page, "Materials");
   await list.asked();
-  await page.getByLabel("Search").fill("sponge");
-  await page.getByLabel("Search").press("Enter");
+  await page.getByRole("searchbox").fill("sponge");
+  await page.getByRole("searchbox").press("Enter");
   await leads(page, /q=sponge/);
   await menu(page, "Records");
   await heading(page, "Ground motions").waitFor();
