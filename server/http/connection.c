@@ -48,6 +48,7 @@ typedef struct Exchange {
     Reply reply;         // once it is answered in the pool or before its body was read
     void (*forget)(void *kept);
     bool is_begun, is_counted, is_busy;
+    bool is_head;     // GET without the body
     bool is_in_pool;  // it is answered there, its connection suspended
     bool is_answered; // with `reply`
 } Exchange;
@@ -121,6 +122,9 @@ static struct MHD_Response *response_of_stream(Exchange *exchange, const Reply *
         sending_next, sending, sending_free);
     if (response == NULL)
         free(sending);
+    // After the head of a chunked answer to HEAD the library would send the last chunk.
+    else if (exchange->is_head && reply->stream.size == UINT64_MAX)
+        MHD_set_response_options(response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END);
     return response;
 }
 
@@ -350,7 +354,8 @@ static enum MHD_Result exchange_begin(Exchange *exchange, struct MHD_Connection 
         exchange_problem(exchange, code, &problem, &reply);
         return exchange_refuse(exchange, &reply, drains);
     }
-    if (strcmp(method, "HEAD") == 0) {
+    exchange->is_head = strcmp(method, "HEAD") == 0;
+    if (exchange->is_head) {
         request->method = "GET";
         request->range = NULL;
     }

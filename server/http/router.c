@@ -249,7 +249,10 @@ static void router_close(const Router *router, const Request *request, Status st
             problem_set(problem, status, "%s", status_title(status));
         reply->wait_ms = 0;
         base_path_apply(reply->link, sizeof reply->link);
-        reply_problem(reply, problem, reply->code == 416 ? 416 : 0, request->target, request->id);
+        // Without the query, which may hold what should not be shown.
+        char path[REQUEST_TARGET_MAX + 1];
+        snprintf(path, sizeof path, "%.*s", (int)strcspn(request->target, "?"), request->target);
+        reply_problem(reply, problem, reply->code == 416 ? 416 : 0, path, request->id);
         reply_indent(reply, request);
     }
     if (reply->wait_ms == 0)

@@ -28,7 +28,7 @@ for ITEM in DOCUMENT["paths"].values():
             for status, answer in OPERATION["responses"].items()}
 
 # Tests that together see every operation.
-SOURCES = ("test_openapi.py", "test_auth.py", "test_bad_requests.py", "test_cache.py", "test_compare.py", "test_crowds.py",
+SOURCES = ("test_openapi.py", "test_access.py", "test_auth.py", "test_bad_requests.py", "test_cache.py", "test_compare.py", "test_crowds.py",
            "test_exchange.py", "test_formats.py", "test_full_disk.py", "test_further_calls.py", "test_guide.py", "test_http.py", "test_jobs.py", "test_material_use.py",
            "test_materials.py", "test_measurements.py", "test_metrics.py", "test_records.py", "test_sensitivity.py",
            "test_serving.py", "test_sweep.py")
