@@ -768,6 +768,60 @@ static Status migrate_step(Sqlite *database, const EmbeddedFile *file, int64_t v
     return status;
 }
 
+typedef struct SchemaColumn {
+    char table_name[64], name[64];
+} SchemaColumn;
+
+typedef struct SchemaColumns {
+    SchemaColumn *at;
+    size_t count;
+} SchemaColumns;
+
+static Status schema_list(Sqlite *database, SchemaColumns *columns, Problem *problem) {
+    static const char sql[] =
+        "SELECT t.name AS table_name, c.name AS name FROM sqlite_schema AS t JOIN "
+        "pragma_table_info(t.name) AS c WHERE t.type = 'table' ORDER BY t.name, c.name";
+    static const SqlColumn row[] = {COLUMN(SchemaColumn, table_name), COLUMN(SchemaColumn, name),
+                                    COLUMN_END};
+    return sqlite_list(database, sql, NULL, NULL, row, sizeof *columns->at, columns, problem);
+}
+
+static int schema_compare(const SchemaColumn *a, const SchemaColumn *b) {
+    const int order = strcmp(a->table_name, b->table_name);
+    return order != 0 ? order : strcmp(a->name, b->name);
+}
+
+// Whether the database has all columns of its version. Before the first release the version stayed 1
+// while the schema changed.
+static Status check_schema(Sqlite *database, const EmbeddedFile *files, int64_t version,
+                           Problem *problem) {
+    Sqlite *made = NULL;
+    SchemaColumns wanted = {0}, stored = {0};
+    Status status = sqlite_open(NULL, DATABASE_WRITER, &made, problem);
+    for (int64_t i = 0; status == STATUS_OK && i < version; i++)
+        status = sqlite_execute(made, files[i].bytes, problem);
+    if (status == STATUS_OK)
+        status = schema_list(made, &wanted, problem);
+    if (status == STATUS_OK)
+        status = schema_list(database, &stored, problem);
+    for (size_t i = 0, k = 0; status == STATUS_OK && i < wanted.count; i++) {
+        while (k < stored.count && schema_compare(&stored.at[k], &wanted.at[i]) < 0)
+            k++;
+        if (k == stored.count || schema_compare(&stored.at[k], &wanted.at[i]) != 0)
+            status = problem_set(
+                problem, STATUS_CONFLICT,
+                "%s was written by an impactd from before the first release: there is no column "
+                "%s.%s; export materials with that program to import them here, and use another "
+                "folder",
+                sqlite3_db_filename(database->connection, "main"), wanted.at[i].table_name,
+                wanted.at[i].name);
+    }
+    free(wanted.at);
+    free(stored.at);
+    sqlite_close(made);
+    return status;
+}
+
 static Status read_version(Sqlite *database, const EmbeddedFile *files, int64_t *version,
                            int64_t *last, Problem *problem) {
     int64_t tables = 0;
@@ -783,7 +837,7 @@ static Status read_version(Sqlite *database, const EmbeddedFile *files, int64_t 
                            "restore a backup or use another folder",
                            path, (long long)*version, (long long)*last);
     if (*version <= *last)
-        return STATUS_OK;
+        return check_schema(database, files, *version, problem);
     return problem_set(problem, STATUS_CONFLICT,
                        "%s was written by a newer impactd, or by one from before the first "
                        "release: its schema's version is %lld, this program's is %lld; use that "

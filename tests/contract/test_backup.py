@@ -380,6 +380,7 @@ def test_what_cannot_be_restored_leaves_the_database():
         refused("holds nothing", write(b""))
         refused("another program", execute("PRAGMA application_id = 7"))
         refused("newer impactd", execute("PRAGMA user_version = 10"))
+        refused("before the first release: there is no column tokens.checks", execute("ALTER TABLE tokens DROP COLUMN checks"))
         refused("must be 1 to 1", execute("PRAGMA user_version = 0"))
         refused("must be 1 to 1", execute("PRAGMA user_version = -3"))
         code, said = restore(own, data, "--force")

@@ -169,6 +169,64 @@ TEST_IN(a_database_is_migrated_from_each_step, make_folder, remove_folder) {
     sqlite_close(database);
 }
 
+static char *schema_text(Sqlite *database) {
+    static const char sql[] = "SELECT group_concat(sql, ';') AS text FROM (SELECT sql FROM "
+                              "sqlite_schema WHERE sql IS NOT NULL ORDER BY name)";
+    static const SqlColumn columns[] = {{.name = "text", .kind = COLUMN_TEXT}, COLUMN_END};
+    char *text = NULL;
+    bool is_found;
+    assert_int_equal(sqlite_first(database, sql, NULL, NULL, columns, &text, &is_found, NULL),
+                     STATUS_OK);
+    return text;
+}
+
+TEST_IN(a_database_of_each_step_since_the_first_schema_gets_the_schema_of_a_new_one, make_folder,
+        remove_folder) {
+    enum { STEPS_MAX = 100 };
+    size_t last = 0;
+    while (embedded_sql[last].path != NULL)
+        last++;
+    assert_in_range(last, 1, STEPS_MAX);
+    Sqlite *database = open_database("new.db");
+    assert_int_equal(sqlite_migrate(database, embedded_sql, NULL, NULL), STATUS_OK);
+    char *expected = schema_text(database);
+    sqlite_close(database);
+    for (size_t step = 0; step <= last; step++) {
+        EmbeddedFile steps[STEPS_MAX + 1] = {0};
+        char name[16];
+        memcpy(steps, embedded_sql, step * sizeof *steps);
+        snprintf(name, sizeof name, "%zu.db", step);
+        database = open_database(name);
+        assert_int_equal(sqlite_migrate(database, steps, NULL, NULL), STATUS_OK);
+        assert_int_equal(sqlite_migrate(database, embedded_sql, NULL, NULL), STATUS_OK);
+        char *text = schema_text(database);
+        assert_string_equal(text, expected);
+        free(text);
+        sqlite_close(database);
+    }
+    free(expected);
+}
+
+TEST_IN(an_older_database_is_refused_with_what_to_do, make_folder, remove_folder) {
+    static const char *const older[] = {"ALTER TABLE tokens DROP COLUMN checks",
+                                        "ALTER TABLE jobs RENAME COLUMN title TO name",
+                                        "DROP TABLE sweep_chunks"};
+    static Problem problem;
+    for (size_t i = 0; i < COUNT(older); i++) {
+        Db *db;
+        db_close(open_store(folder));
+        Sqlite *database = open_database("impactd.db");
+        assert_int_equal(sqlite_execute(database, older[i], NULL), STATUS_OK);
+        sqlite_close(database);
+        problem_clear(&problem);
+        assert_int_equal(db_open(folder, &db, &problem), STATUS_CONFLICT);
+        assert_non_null(strstr(problem.detail, "before the first release"));
+        assert_non_null(strstr(problem.detail, "use another folder"));
+        assert_int_equal(remove_folder(NULL), 0);
+        assert_int_equal(make_folder(NULL), 0);
+    }
+}
+
 TEST_IN(a_newer_database_and_an_impossible_version_are_refused, make_folder, remove_folder) {
     static Problem problem;
     problem_clear(&problem);
