@@ -12,13 +12,14 @@
 #   storm       a million requests, 10,000 cancels
 #   fuzz        mutated ground motions and material files
 #   browser     the browser tests with slow computers and late answers
+#   coverage    the lines and branches of server/ and core/ that unit and contract tests reach
 #   package     the Debian package in an empty Debian 12: install, upgrade, remove, purge
 #   bench       the benchmarks
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
 
-all=(commit clang threads sanitized kills truth storm fuzz browser package bench)
+all=(commit clang threads sanitized kills truth storm fuzz browser coverage package bench)
 is_quick=
 [ "${1-}" != --quick ] || { is_quick=1 && shift; }
 parts=("${@:-${all[@]}}")
@@ -168,6 +169,12 @@ part_browser() {
         sized test_token.mjs '' "$python" tests/browser/test_browser.py --build build $pace
         [ -z "$is_quick" ] || break
     done
+}
+
+# 1200 s of CPU.
+part_coverage() {
+    build coverage
+    sized 'run cache' run "$python" tests/coverage.py --build build-coverage
 }
 
 part_package() {

@@ -791,8 +791,8 @@ static int schema_compare(const SchemaColumn *a, const SchemaColumn *b) {
     return order != 0 ? order : strcmp(a->name, b->name);
 }
 
-// Whether the database has all columns of its version. Before the first release the version stayed 1
-// while the schema changed.
+// Whether the database has all columns of its version. Before the first release the version stayed
+// 1 while the schema changed.
 static Status check_schema(Sqlite *database, const EmbeddedFile *files, int64_t version,
                            Problem *problem) {
     Sqlite *made = NULL;
