@@ -1,14 +1,18 @@
 #!/usr/bin/env python3
-"""Connections that bring nothing: chunk headers that never fit, and idle clients where few files may be open."""
+"""Connections that bring nothing: chunk headers that never fit, and idle clients where few files may be open; what is listened on."""
 
 import os
 import resource
 import socket
 import sys
+import tempfile
 import time
+import urllib.error
+import urllib.request
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from access import token  # noqa: E402
 
 HEAD = b"POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
 
@@ -63,6 +67,26 @@ def test_idle_connections_make_room_where_few_files_may_be_open():
         for client in idle:
             client.close()
     assert limits == resource.getrlimit(resource.RLIMIT_NOFILE)
+
+
+def test_each_kind_of_loopback_is_served_and_a_taken_port_is_reported():
+    """127.0.0.1, another address of 127/8 and [::1]: with their own names as Host; a second daemon there is told of the port."""
+    for address in ("127.0.0.1", "127.3.2.1", "[::1]"):
+        with program.daemon("--listen", f"{address}:0") as daemon, tempfile.TemporaryDirectory() as folder:
+            assert daemon.host == address, daemon.url
+            for host, status in ((f"{address}:{daemon.port}", 200), ("localhost", 200), ("evil.example.org", 421)):
+                reply = urllib.request.Request(f"{daemon.url}/version", headers={"Host": host})
+                try:
+                    with urllib.request.urlopen(reply, timeout=20) as answer:
+                        assert answer.status == status, (address, host)
+                except urllib.error.HTTPError as error:
+                    assert error.code == status, (address, host, error.code)
+            code, _, said = program.run("serve", "--listen", f"{address}:{daemon.port}", "--data", folder)
+            assert code == 1 and f"port {daemon.port}" in said and "is taken" in said and f"--listen {address}:PORT" in said, (code, said)
+    with tempfile.TemporaryDirectory() as folder:
+        token(folder, "lab")
+        code, _, said = program.run("serve", "--listen", "192.0.2.1:0", "--data", folder)
+        assert code == 1 and "cannot listen on 192.0.2.1" in said, (code, said)
 
 
 if __name__ == "__main__":
