@@ -18,6 +18,8 @@ from access import bearer, impactd, token, until  # noqa: E402
 from asking import sponge  # noqa: E402
 from daemon import Daemon  # noqa: E402
 
+SANITIZED = "nightly"
+
 SCOPES = ("read", "submit", "materials", "admin")
 
 # What needs no token: what the API is, whether there is a daemon, the page that asks for a token and its files.
@@ -303,25 +305,28 @@ def test_no_request_leads_out_of_the_data_folder():
             file.write('{"canary": 1}')
         traced = ["strace", "-D", "-f", "-q", "--seccomp-bpf", "-o", trace, "-e",
                   "trace=%file,%process,socket,connect,bind,listen,ptrace,io_uring_setup,memfd_create"]
-        if subprocess.run([*traced, "true"], capture_output=True, check=False).returncode != 0:
-            raise program.Skipped("strace may not trace here")
+        # The leak sanitizer does not work under strace.
+        is_traced = not program.is_sanitized() and subprocess.run([*traced, "true"], capture_output=True, check=False).returncode == 0
         with open(wrapper, "w", encoding="utf-8") as file:
             file.write(f'#!/bin/sh\nexec {" ".join(traced)} {program.impactd()} "$@"\n')
         os.chmod(wrapper, 0o700)
         daemon = Daemon(program.build, data=data)
-        daemon.program = wrapper
+        daemon.program = wrapper if is_traced else daemon.program
         with daemon:
             count, wrong = climb(daemon, secret)
             known, _ = credentials(data)
             assert until(lambda: daemon.get("/v1/jobs").status == 401)
             asked, departing, _ = ask_all(daemon, routes(), populated(daemon, known["admin"][0]), known, "admin")
             assert daemon.stop(60)[0] == 0
-        assert until(lambda: "+++ exited with 0 +++" in read(trace)), "the trace has no end"
         assert all(name.startswith("impactd.") for name in os.listdir(data)), os.listdir(data)
+        assert wrong + departing == [], (len(wrong), wrong[:20], departing[:20])
+        print(f"      {count} hostile paths and names, {asked} good requests")
+        if not is_traced:
+            raise program.Skipped("the paths are done; strace does not work here")
+        assert until(lambda: "+++ exited with 0 +++" in read(trace)), "the trace has no end"
         calls, lines = departures(read(trace), data)
-    assert wrong + departing == [], (len(wrong), wrong[:20], departing[:20])
     assert lines == [], "\n".join(lines[:20])
-    print(f"      {count} hostile paths and names and {asked} good requests, {calls} system calls: 0 out of place")
+    print(f"      {calls} system calls: 0 out of place")
 
 
 if __name__ == "__main__":
