@@ -235,7 +235,7 @@ def climbing(secret):
     once = re.sub(r"[./]", lambda one: f"%{ord(one[0]):02x}", climb)
     yield from ("..", ".", "%2e%2e", ".%2e", "%252e%252e", "..%00", "%00", "x%00.json", "....", "...", "..;", "%5c", "..%5c..%5cx", "\\..\\x",
                 "%c0%ae%c0%ae", "%e0%80%ae", "%uff0e%uff0e", "~", "~root", "%2f", "%2fetc%2fpasswd", "C:", "con", "-", "*", "$HOME", "%24HOME",
-                "..%2fimpactd.db", "impactd.db", "%2e%2e%2fimpactd.lock", "file:%2f%2f%2fetc%2fpasswd")
+                "..%2fimpactd.db", "impactd.db", "%2e%2e%2fimpactd.lock", "file:%2f%2f%2fetc%2fpasswd", 600 * "a")
     yield from (climb, once, once.replace("%", "%25"), once.replace("%2f", "%5c"), once.replace("%2e", "%c0%ae"),
                 secret.replace("/", "%2f"), secret.replace("/", "%252f"), once + "%00.json", once + "%2500.json")
 

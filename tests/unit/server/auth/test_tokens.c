@@ -127,6 +127,23 @@ TEST(an_expired_token_says_so) {
     db_close(db);
 }
 
+TEST(so_many_tokens_are_kept_and_no_more) {
+    Db *db;
+    static Problem problem;
+    char name[TOKEN_NAME_SIZE], header[128];
+    assert_int_equal(db_open(NULL, &db, NULL), STATUS_OK);
+    for (int i = 0; i < TOKENS_MAX; i++) {
+        snprintf(name, sizeof name, "t%d", i);
+        assert_int_equal(add(db, name, "read", 0, header), STATUS_OK);
+    }
+    TokenRow row = {.name = "one-more"};
+    char token[TOKEN_SIZE];
+    assert_int_equal(token_make("read", 0, &row, token, NULL), STATUS_OK);
+    assert_int_equal(db_token_add(db, &row, &problem), STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "forget those that are revoked"));
+    db_close(db);
+}
+
 TEST(scopes_are_a_list_of_known_names) {
     static const char *const bad[] = {"",     ",",           "read,", ",read", "read,,submit",
                                       "Read", "read submit", "write"};

@@ -57,6 +57,30 @@ TEST_IN(a_second_daemon_is_refused_with_the_folders_name, make_folder, remove_fo
     db_close(open_store(folder));
 }
 
+TEST_IN(what_stands_in_the_way_of_a_file_is_reported_with_its_path, make_folder, remove_folder) {
+    static const char *const taken[] = {"impactd.lock", "impactd.db"};
+    static Problem problem;
+    char path[4200], below[128];
+    Db *db;
+    for (size_t i = 0; i < COUNT(taken); i++) { // folders in place of files
+        snprintf(path, sizeof path, "%s/%s", folder, taken[i]);
+        assert_int_equal(mkdir(path, 0700), 0);
+        problem_clear(&problem);
+        assert_int_equal(db_open(folder, &db, &problem), STATUS_IO);
+        assert_non_null(strstr(problem.detail, path));
+        assert_int_equal(rmdir(path), 0);
+    }
+    db_close(open_store(folder));
+    snprintf(below, sizeof below, "%s/impactd.db/x", folder);
+    problem_clear(&problem);
+    assert_int_equal(db_open(below, &db, &problem), STATUS_IO);
+    assert_non_null(strstr(problem.detail, "cannot make the folder"));
+    memset(path, 'a', sizeof path - 1);
+    path[sizeof path - 1] = '\0';
+    assert_int_equal(db_open(path, &db, &problem), STATUS_IO);
+    assert_int_equal(db_open("", &db, &problem), STATUS_IO);
+}
+
 TEST_IN(a_missing_folder_is_made_for_this_user_alone, make_folder, remove_folder) {
     char deep[128], file[160];
     snprintf(deep, sizeof deep, "%s/a/b", folder);
