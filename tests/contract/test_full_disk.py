@@ -2,6 +2,7 @@
 """A full disk: writes are answered 507, reads go on, and all goes on without a restart when there is room."""
 
 import os
+import sqlite3
 import sys
 import time
 
@@ -137,6 +138,25 @@ def test_a_database_that_was_moved_away_takes_no_jobs():
         daemon.kill()
         daemon.start()
         assert daemon.get(known["links"]["self"]).status == 200
+
+
+def test_a_result_that_the_database_refuses_makes_failed_jobs():
+    """Refused for good, as what is too large is: all jobs of the scene fail with the reason, and the daemon goes on; later the
+    same scene runs."""
+    with program.daemon() as daemon:
+        long = long_scene(0, 8)
+        jobs = [daemon.submit({**long, "title": title}, headers=ASYNC).json()["id"] for title in ("one", "two")]
+        base = sqlite3.connect(os.path.join(daemon.data, "impactd.db"), timeout=20)
+        base.executescript("CREATE TRIGGER refuses BEFORE INSERT ON results BEGIN SELECT RAISE(ABORT, 'refused by a trigger'); END")
+        for job in jobs:
+            ended = daemon.finished(job)
+            assert ended["status"] == "failed" and "refused by a trigger" in ended["problem"]["detail"], ended
+        reply = daemon.submit(scene(1), wait=30)
+        assert reply.status in (200, 202, 409) and "refused by a trigger" in reply.body.decode(), reply
+        base.executescript("DROP TRIGGER refuses")
+        base.close()
+        assert daemon.submit(scene(1), wait=30).json()["status"] == "successful"
+        assert program.finished(daemon, {**long, "title": "three"})["status"] == "successful"
 
 
 if __name__ == "__main__":
