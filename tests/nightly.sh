@@ -7,7 +7,7 @@
 #   clang       the program and its tests as clang compiles them, without a warning
 #   threads     the thread sanitizer: unit tests of jobs, db and http, requests and cancels
 #   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
-#   kills       kill -9 amid jobs, sweeps and imports, full disks
+#   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures
 #   truth       the long campaigns of tests/truth
 #   storm       a million requests, 10,000 cancels
 #   fuzz        mutated ground motions and material files
@@ -113,6 +113,8 @@ part_kills() {
         check "$python" "tests/contract/test_$file.py" --build build
         [ -z "$is_quick" ] || [ "$file" = exchange_kill ] || break
     done
+    # What is acknowledged is on the disk, whichever of the writes that were not synced are there too. 120 s
+    sized '--states 20 --scenes 5 --daemons 2' '--states 1500 --scenes 60 --daemons 100' "$python" tests/power/power.py --build build
 }
 
 # Scenes and seed first.
