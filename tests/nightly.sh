@@ -7,7 +7,7 @@
 #   clang       the program and its tests as clang compiles them, without a warning
 #   threads     the thread sanitizer: unit tests of jobs, db and http, requests and cancels
 #   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
-#   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures
+#   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
 #   truth       the long campaigns of tests/truth
 #   storm       a million requests, 10,000 cancels
 #   fuzz        mutated ground motions and material files
@@ -115,6 +115,8 @@ part_kills() {
     done
     # What is acknowledged is on the disk, whichever of the writes that were not synced are there too. 120 s
     sized '--states 20 --scenes 5 --daemons 2' '--states 1500 --scenes 60 --daemons 100' "$python" tests/power/power.py --build build
+    # Damaged bytes, pages, indices and logs: right answers or problems, no end of the daemon. 100 s
+    sized '--copies 10' '--copies 500' "$python" tests/damage/damage.py --build build
 }
 
 # Scenes and seed first.

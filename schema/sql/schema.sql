@@ -1,7 +1,8 @@
 -- The database as of version 1. Times are milliseconds since 1970 UTC, quantities SI, documents JSON text. Every table has
 -- an integer key of its own, which rises with the order of arrival, and its public name beside it, unique.
--- checks: the CRC-32 of each column that server/db marks as checked, four bytes each in the order of its table there. A row
--- without them is damaged; those inserted here get theirs within the same transaction.
+-- checks: the CRC-32 of each column that server/db marks as checked, four bytes each in the order of its table there, then of
+-- those that it marks as bound, which the first rows lack. A row without checks is damaged; those inserted here get theirs
+-- within the same transaction.
 
 -- Materials. Revisions, measurements, reviews and the audit trail are added, never changed and never deleted. author,
 -- reviewer, who: the token's name; NULL: the local user, or of a revision the program; 'impactd': the program reviewed it.

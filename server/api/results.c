@@ -110,44 +110,57 @@ static void result_put_links(Bytes *bytes, const ResultRow *row, const Simulatio
     bytes_text(bytes, "}");
 }
 
-static void manifest_put_material(App *app, Bytes *bytes, const ReferenceRow *use) {
+static Status manifest_put_material(App *app, Bytes *bytes, const ReferenceRow *use,
+                                    Problem *problem) {
     MaterialRevision material = {0};
-    if (db_material(app->db, use->slug, use->revision, &material, NULL) == STATUS_OK)
+    Status status = db_material(app->db, use->slug, use->revision, &material, problem);
+    if (status == STATUS_OK) {
         material_write_contents(bytes, &material);
-    else // no longer here: its numbers stand in the scene
+    } else if (status == STATUS_NOT_FOUND) { // of another server: its numbers stand in the scene
+        problem_clear(problem);
         bytes_json(bytes, "{\"slug\": %s, \"revision\": %llu}", use->slug, use->revision);
+        status = STATUS_OK;
+    }
     material_revision_clear(&material);
+    return status;
 }
 
-static void result_put_material(App *app, Bytes *bytes, const ReferenceRow *use) {
+static Status result_put_material(App *app, Bytes *bytes, const ReferenceRow *use,
+                                  Problem *problem) {
     const char *base = base_path();
     (void)app;
+    (void)problem;
     bytes_json(bytes,
                "{\"slug\": %s, \"revision\": %llu, \"links\": {\"revision\": "
                "\"%s/v1/materials/%s@%llu\", \"used_by\": \"%s/v1/materials/%s@%llu/used-by\"}}",
                use->slug, use->revision, base, use->slug, use->revision, base, use->slug,
                use->revision);
+    return STATUS_OK;
 }
 
 // The materials of the scene and its study, each by `put`.
-static void result_put_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
-                                 void (*put)(App *app, Bytes *bytes, const ReferenceRow *use)) {
+static Status result_put_materials(App *app, Bytes *bytes, const StudyRequest *inquiry,
+                                   Status (*put)(App *app, Bytes *bytes, const ReferenceRow *use,
+                                                 Problem *problem),
+                                   Problem *problem) {
+    Status status = STATUS_OK;
     Bytes lines = {0};
     ReferenceRow use;
     const char *separator = "";
     references_write(&lines, inquiry, true);
     const char *rest = lines.at;
     bytes_text(bytes, "[");
-    while (references_next(&rest, &use)) {
+    while (status == STATUS_OK && references_next(&rest, &use)) {
         if (use.revision == 0)
             continue;
         bytes_text(bytes, separator);
-        put(app, bytes, &use);
+        status = put(app, bytes, &use, problem);
         separator = ", ";
     }
     bytes_text(bytes, "]");
     bytes->is_failed = bytes->is_failed || lines.is_failed;
     bytes_clear(&lines);
+    return status;
 }
 
 static void result_put_members(Bytes *bytes, const ResultRow *row, const StudyRequest *inquiry,
@@ -166,7 +179,7 @@ static void result_put_members(Bytes *bytes, const ResultRow *row, const StudyRe
                (unsigned long long)row->count);
     document_join(bytes, row->warnings, row->notes);
     bytes_text(bytes, ", \"materials\": ");
-    result_put_materials(NULL, bytes, inquiry, result_put_material);
+    (void)result_put_materials(NULL, bytes, inquiry, result_put_material, NULL);
     bytes_text(bytes, ", \"study\": ");
     if (answer->study != NULL)
         document_answer(bytes, answer->study);
@@ -202,14 +215,14 @@ Status results_show(App *app, const Request *request, Reply *reply, Problem *pro
 
 Status manifest_put(App *app, const ResultRow *row, Bytes *bytes, Problem *problem) {
     StudyRequest inquiry = {0};
-    const Status status = result_read_scene(row, &inquiry, problem);
+    Status status = result_read_scene(row, &inquiry, problem);
     if (status == STATUS_OK) {
         bytes_json(bytes,
                    "{\"id\": %s, \"engine\": %s, \"created\": %s, \"program\": {\"name\": "
                    "\"impactd\", \"version\": %s, \"build\": %s}, \"scene\": %p, \"materials\": ",
                    row->id, row->engine, clock_rfc3339(row->created_unix_ms).at, program_version,
                    program_build, row->scene);
-        result_put_materials(app, bytes, &inquiry, manifest_put_material);
+        status = result_put_materials(app, bytes, &inquiry, manifest_put_material, problem);
         // The CPU time of a study is measured once and stored; another run measures another one.
         const bool is_measured = inquiry.study != NULL && study_kind(inquiry.study)->is_measured;
         bytes_json(bytes,

@@ -157,10 +157,11 @@ const Command command_check_db = {
     .summary = "check the database of a server, also while it runs",
     .help = "  impactd check-db --data /var/lib/impactd\n"
             "\n"
-            "Checks the file as SQLite does, the references between tables, and all rows that\n"
-            "have checksums. Prints each damaged row. Exit code 1 if there is one. backup and\n"
-            "restore make the same check. A server does not show a damaged row. Delete the\n"
-            "damaged job or result, or restore a backup.\n",
+            "Checks the file with its indices as SQLite does, the references between tables,\n"
+            "and all rows that have checksums. Prints each fault and each damaged row. Exit\n"
+            "code 1 if there is one, 4 without a database. backup and restore make the same\n"
+            "check. A server does not show a damaged row. Delete the damaged job or result,\n"
+            "or restore a backup.\n",
     .options = check_db_fields,
     .size = sizeof(BackupSettings),
     .run = check_db,

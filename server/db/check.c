@@ -58,20 +58,38 @@ static Status check_references(Sqlite *database, const DbCheck *check, uint64_t 
     return STATUS_OK;
 }
 
+// What cannot be read is damage too, after which the check goes on.
+static Status check_go_on(Status status, const DbCheck *check, const char *what, uint64_t *faults,
+                          Problem *problem) {
+    char text[DAMAGE_SIZE];
+    if (status != STATUS_IO && status != STATUS_INTERNAL)
+        return status;
+    snprintf(text, sizeof text, "%.60s cannot be read to its end: %.200s", what, problem->detail);
+    check->report_damage(check->context, text);
+    problem_clear(problem);
+    ++*faults;
+    return STATUS_OK;
+}
+
 Status check_run(Sqlite *database, const DbCheck *check, Problem *problem) {
-    uint64_t damaged = 0;
-    TRY(sqlite_check(database, problem));
-    TRY(check_references(database, check, &damaged, problem));
+    uint64_t faults = 0, damaged = 0;
+    Status status = sqlite_check(database, check->report_damage, check->context, &faults, problem);
+    TRY(check_go_on(status, check, "the file", &faults, problem));
+    status = check_references(database, check, &damaged, problem);
+    TRY(check_go_on(status, check, "the references between tables", &faults, problem));
     for (const CheckedTable *const *tables = checked_tables(); *tables != NULL; tables++) {
         TableCheck table = {.report = check->report_damage, .context = check->context};
-        TRY(sqlite_check_table(database, *tables, &table, problem));
+        status = sqlite_check_table(database, *tables, &table, problem);
+        TRY(check_go_on(status, check, (*tables)->name, &faults, problem));
         if (check->report_table != NULL)
             check->report_table(check->context, (*tables)->name, table.rows, table.damaged);
         damaged += table.damaged;
     }
-    return damaged == 0 ? STATUS_OK
-                        : problem_set(problem, STATUS_IO, "the database has %llu damaged rows",
-                                      (unsigned long long)damaged);
+    return faults + damaged == 0
+               ? STATUS_OK
+               : problem_set(problem, STATUS_IO,
+                             "the database is damaged: %llu faults of the file, %llu damaged rows",
+                             (unsigned long long)faults, (unsigned long long)damaged);
 }
 
 Status check_open(const char *path, Sqlite **source, Problem *problem) {

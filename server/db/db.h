@@ -236,6 +236,9 @@ Status db_sweep_chunks(Db *db, int64_t sweep, SweepChunkRows *chunks, Problem *p
 Status db_sweep_chunk(Db *db, int64_t sweep, uint64_t number, SweepChunkRow *chunk,
                       Problem *problem);
 void sweep_chunk_row_clear(SweepChunkRow *row);
+// Compares the checksums of all its chunks, of which db_sweep_read reads parts. STATUS_INTERNAL:
+// one is damaged.
+Status db_sweep_compare(Db *db, int64_t sweep, Problem *problem);
 // Bytes `offset` ... of the rows of each of these chunks, `size` or as many as there are: those of
 // chunk i at target + i size. STATUS_CONFLICT where sweep or chunk is not what it was when it was
 // loaded.

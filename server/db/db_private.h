@@ -57,6 +57,9 @@ typedef struct QueryCounts {
 } QueryCounts;
 extern const SqlColumn query_counts_columns[];
 // The first row of a query into `row` of `size` bytes, which is zeroed before. Without one
+// STATUS_INTERNAL where a row that an index led to has another name than was asked for; NULL and ""
+// are unknown.
+Status db_require_name(const char *found, const char *asked, Problem *problem);
 // STATUS_NOT_FOUND, of which the format says what is missing.
 __attribute__((format(printf, 8, 9))) Status db_get(Db *db, const char *sql, const QueryKey *key,
                                                     const SqlColumn *columns, void *row,
@@ -107,6 +110,7 @@ extern const SqlColumn material_review_columns[], material_measurement_columns[]
 typedef struct MaterialKey {
     int64_t number;
     uint64_t latest, version, measurements;
+    char slug[72];               // as its row has it
     char status[16], author[72]; // of the revision asked for; "": there is none, or unknown
 } MaterialKey;
 Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, MaterialKey *key,

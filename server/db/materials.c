@@ -16,13 +16,14 @@
 
 // clang-format off
 #define OF_SLUG COLUMN_WRITE("material", "(SELECT number FROM materials WHERE slug = :slug)")
+#define WITH_SLUG ", (SELECT slug FROM materials m WHERE m.number = material) AS slug"
 #define CHECKED(Type, member) COLUMN_WITH(Type, member, COLUMN_CHECKED)
 #define NUMBER_OR_NULL(Type, member, flags_) {.name = #member, .kind = COLUMN_COUNT, .flags = flags_, \
     .offset = offsetof(Type, member), .size = sizeof(uint64_t), .write = "nullif(:" #member ", 0)"}
 
 static const SqlColumn revision_own_columns[] = {
     OF_SLUG,
-    COLUMN_OF(MaterialRevision, slug, "slug", COLUMN_ID, "slug"),
+    COLUMN_OF(MaterialRevision, slug, "slug", COLUMN_ID | COLUMN_BOUND, "slug"),
     COLUMN_WITH(MaterialRevision, revision, COLUMN_CHECKED | COLUMN_ID),
     CHECKED(MaterialRevision, lists),
     NUMBER_OR_NULL(MaterialRevision, reverts, COLUMN_CHECKED),
@@ -40,7 +41,7 @@ static const SqlColumn revision_own_columns[] = {
 // clang-format on
 static SqlColumn revision_columns[40];
 const CheckedTable revisions_table =
-    CHECKED_TABLE("material_revisions", revision_columns, MaterialRevision);
+    CHECKED_TABLE_WITH("material_revisions", revision_columns, MaterialRevision, WITH_SLUG);
 
 static void revision_columns_make(void) {
     SqlColumn *column = revision_columns;
@@ -74,7 +75,7 @@ const SqlColumn *material_revision_columns(void) {
 // clang-format off
 const SqlColumn material_review_columns[] = {
     OF_SLUG,
-    COLUMN_OF(MaterialReview, slug, "slug", COLUMN_ID, "slug"),
+    COLUMN_OF(MaterialReview, slug, "slug", COLUMN_ID | COLUMN_BOUND, "slug"),
     COLUMN_WITH(MaterialReview, revision, COLUMN_CHECKED | COLUMN_ID),
     CHECKED(MaterialReview, status),
     CHECKED(MaterialReview, reason),
@@ -83,32 +84,28 @@ const SqlColumn material_review_columns[] = {
     COLUMN_END
 };
 const CheckedTable reviews_table =
-    CHECKED_TABLE("material_reviews", material_review_columns, MaterialReview);
+    CHECKED_TABLE_WITH("material_reviews", material_review_columns, MaterialReview, WITH_SLUG);
 
 const SqlColumn material_measurement_columns[] = {
     OF_SLUG,
-    COLUMN_OF(MaterialMeasurement, slug, "slug", COLUMN_ID, "slug"),
+    COLUMN_OF(MaterialMeasurement, slug, "slug", COLUMN_ID | COLUMN_BOUND, "slug"),
     COLUMN_WITH(MaterialMeasurement, measurement, COLUMN_CHECKED | COLUMN_ID),
     CHECKED(MaterialMeasurement, author),
     CHECKED(MaterialMeasurement, comment),
     CHECKED(MaterialMeasurement, created_unix_ms),
     CHECKED(MaterialMeasurement, document),
-    {.name = "drops", .kind = COLUMN_COUNT, .offset = offsetof(MaterialMeasurement, drops),
-     .write = "coalesce(json_array_length(:document, '$.drops'), 0)"},
-    {.name = "traces", .kind = COLUMN_COUNT, .offset = offsetof(MaterialMeasurement, traces),
-     .write = "coalesce(json_array_length(:document, '$.traces'), 0)"},
-    COLUMN_WRITE("head", "json_remove(:document, '$.drops', '$.traces')"),
+    COLUMN_WITH(MaterialMeasurement, drops, COLUMN_BOUND),
+    COLUMN_WITH(MaterialMeasurement, traces, COLUMN_BOUND),
+    COLUMN_WITH(MaterialMeasurement, head, COLUMN_BOUND),
     COLUMN_END
 };
-const CheckedTable measurements_table =
-    CHECKED_TABLE("material_measurements", material_measurement_columns, MaterialMeasurement);
+const CheckedTable measurements_table = CHECKED_TABLE_WITH(
+    "material_measurements", material_measurement_columns, MaterialMeasurement, WITH_SLUG);
 
 static const SqlColumn audit_columns[] = {
     OF_SLUG,
-    COLUMN_OF(AuditEntry, slug, "slug", COLUMN_ID, "slug"),
-    {.name = "version", .kind = COLUMN_COUNT, .flags = COLUMN_ID, .offset = offsetof(AuditEntry, version),
-     .write = "1 + (SELECT coalesce(max(t.version), 0) FROM material_trail t JOIN materials m ON "
-              "m.number = t.material WHERE m.slug = :slug)"},
+    COLUMN_OF(AuditEntry, slug, "slug", COLUMN_ID | COLUMN_BOUND, "slug"),
+    COLUMN_WITH(AuditEntry, version, COLUMN_ID | COLUMN_BOUND),
     CHECKED(AuditEntry, action),
     NUMBER_OR_NULL(AuditEntry, revision, COLUMN_CHECKED),
     NUMBER_OR_NULL(AuditEntry, measurement, COLUMN_CHECKED),
@@ -117,10 +114,11 @@ static const SqlColumn audit_columns[] = {
     CHECKED(AuditEntry, created_unix_ms),
     COLUMN_END
 };
-const CheckedTable audit_table = CHECKED_TABLE("material_trail", audit_columns, AuditEntry);
+const CheckedTable audit_table =
+    CHECKED_TABLE_WITH("material_trail", audit_columns, AuditEntry, WITH_SLUG);
 
 // A row of one text is that text.
-static const SqlColumn slug_columns[] = {{.name = "slug", .kind = COLUMN_TEXT, .size = sizeof(char *)}, COLUMN_END};
+static const SqlColumn slug_columns[] = {{.name = "slug", .kind = COLUMN_TEXT, .flags = COLUMN_ID, .size = sizeof(char *)}, COLUMN_END};
 
 static const SqlColumn moment_columns[] = {
     COLUMN(MaterialMoment, revisions),
@@ -131,6 +129,7 @@ static const SqlColumn moment_columns[] = {
 
 static const SqlColumn material_key_columns[] = {
     COLUMN(MaterialKey, number),
+    COLUMN_WITH(MaterialKey, slug, COLUMN_ID),
     COLUMN(MaterialKey, latest),
     COLUMN(MaterialKey, version),
     COLUMN(MaterialKey, measurements),
@@ -229,7 +228,7 @@ static int64_t texts_length(const Material *material) {
 
 // Not by the view: SQLite would make all its rows for the join.
 static const char key_sql[] =
-    "SELECT m.number, "
+    "SELECT m.number, (SELECT slug FROM materials n WHERE n.number = m.number) AS slug, "
     "(SELECT coalesce(max(revision), 0) FROM material_revisions r WHERE r.material = m.number) "
     "AS latest, "
     "(SELECT coalesce(max(version), 0) FROM material_trail t WHERE t.material = m.number) AS "
@@ -258,6 +257,16 @@ Status db_reviews_compare(Db *db, const char *first, const char *last, Problem *
     return db_read(db, reviews_compare, &(QueryKey){.slug = first, .name = last}, problem);
 }
 
+// The row is the one asked for, and its first revision and its entry are there.
+static Status material_key_check(const MaterialKey *key, const char *slug, Problem *problem) {
+    if (key->number != 0 && (key->latest == 0 || key->version == 0))
+        return problem_set(problem, STATUS_INTERNAL,
+                           "the database is damaged: the revisions of the material %.64s are "
+                           "missing; put a backup in its place (impactd restore)",
+                           slug);
+    return db_require_name(key->slug, slug, problem);
+}
+
 static const char no_material[] = "there is no material \"%.64s\"";
 
 Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem *problem) {
@@ -265,6 +274,7 @@ Status db_material_state(Db *db, const char *slug, MaterialState *state, Problem
     *state = (MaterialState){0};
     TRY(db_get(db, key_sql, &(QueryKey){.slug = slug}, material_key_columns, &key, sizeof key,
                problem, no_material, slug));
+    TRY(material_key_check(&key, slug, problem));
     *state = (MaterialState){key.latest, key.version, key.measurements};
     return STATUS_OK;
 }
@@ -298,8 +308,14 @@ Status db_material(Db *db, const char *slug, uint64_t revision, MaterialRevision
     TRY(db_reviews_compare(db, slug, slug, problem));
     TRY(db_first(db, revision == 0 ? head_sql : revision_sql, query_key_columns, &key,
                  material_revision_columns(), material, &is_found, problem));
-    return is_found ? material_lists_read(material, problem)
-                    : error_no_revision(db, slug, revision, problem);
+    if (!is_found)
+        return error_no_revision(db, slug, revision, problem);
+    Status status = db_require_name(material->slug, slug, problem);
+    if (status == STATUS_OK)
+        status = material_lists_read(material, problem);
+    if (status != STATUS_OK)
+        material_revision_clear(material);
+    return status;
 }
 
 static void shared_revision_free(Refcount *refcount) {
@@ -391,8 +407,9 @@ Status db_material_measurement(Db *db, const char *slug, uint64_t number,
 Status db_measurement_heads(Db *db, const char *slug, uint64_t before, size_t max,
                             MaterialMeasurements *measurements, Problem *problem) {
     static const char sql[] =
-        "SELECT m.slug, t.measurement, t.author, t.comment, t.created_unix_ms, t.head AS document, "
-        "t.drops, t.traces FROM material_measurements t JOIN materials m ON m.number = t.material "
+        "SELECT m.slug, t.measurement, t.author, t.comment, t.created_unix_ms, t.head, "
+        "t.drops, t.traces, t.checks FROM material_measurements t JOIN materials m ON m.number = "
+        "t.material "
         "WHERE m.slug = :slug AND t.measurement < :number ORDER BY t.measurement DESC LIMIT :max";
     const QueryKey key = key_of(slug, before, max);
     return db_list(db, sql, query_key_columns, &key, material_measurement_columns,
@@ -467,8 +484,9 @@ Status material_key_find(Sqlite *database, const char *slug, uint64_t revision, 
     const QueryKey asked = key_of(slug, revision, 0);
     *key = (MaterialKey){0};
     TRY(reviews_compare(database, &(QueryKey){.slug = slug, .name = slug}, problem));
-    return sqlite_first(database, key_sql, query_key_columns, &asked, material_key_columns, key,
-                        NULL, problem);
+    TRY(sqlite_first(database, key_sql, query_key_columns, &asked, material_key_columns, key, NULL,
+                     problem));
+    return material_key_check(key, slug, problem);
 }
 
 typedef struct Room {
@@ -547,17 +565,34 @@ Status material_review_add(Sqlite *database, const MaterialReview *review, Probl
 Status material_measurement_add(Sqlite *database, const MaterialMeasurement *measurement,
                                 Problem *problem) {
     static const char sql[] = "INSERT INTO material_measurements {insert}";
+    static const char head_sql[] =
+        "SELECT json_remove(:document, '$.drops', '$.traces') AS head, "
+        "coalesce(json_array_length(:document, '$.drops'), 0) AS drops, "
+        "coalesce(json_array_length(:document, '$.traces'), 0) AS traces";
+    MaterialMeasurement stored = *measurement; // borrows
+    stored.head = NULL;
     TRY(require_number(measurement->measurement, CATALOGUE_MEASUREMENTS, measurement->slug,
                        "measurements", problem));
     TRY(room_reserve(database, length(measurement->comment) + length(measurement->document),
                      problem));
-    return sqlite_change(database, sql, material_measurement_columns, measurement, NULL, problem);
+    TRY(sqlite_first(database, head_sql, material_measurement_columns, measurement,
+                     material_measurement_columns, &stored, NULL, problem));
+    const Status status =
+        sqlite_change(database, sql, material_measurement_columns, &stored, NULL, problem);
+    free(stored.head);
+    return status;
 }
 
 Status audit_entry_add(Sqlite *database, const AuditEntry *entry, Problem *problem) {
     static const char sql[] = "INSERT INTO material_trail {insert}";
+    static const char version_sql[] =
+        "SELECT 1 + coalesce(max(t.version), 0) AS version FROM material_trail t JOIN materials m "
+        "ON m.number = t.material WHERE m.slug = :slug";
+    AuditEntry stored = *entry; // borrows
     TRY(room_reserve(database, length(entry->why), problem));
-    return sqlite_change(database, sql, audit_columns, entry, NULL, problem);
+    TRY(sqlite_first(database, version_sql, audit_columns, entry, audit_columns, &stored, NULL,
+                     problem));
+    return sqlite_change(database, sql, audit_columns, &stored, NULL, problem);
 }
 
 // What one of the four writes below adds: the first of these that is there.

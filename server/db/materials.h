@@ -83,6 +83,7 @@ typedef struct MaterialMeasurement {
     char *author, *comment;
     int64_t created_unix_ms;
     char *document; // the drop test as JSON
+    char *head;     // the same without drops and traces, which are counted; of a stored one
     uint64_t drops, traces;
 } MaterialMeasurement;
 typedef struct MaterialMeasurements {
@@ -93,8 +94,7 @@ typedef struct MaterialMeasurements {
 Status db_material_measurement(Db *db, const char *slug, uint64_t number,
                                MaterialMeasurement *measurement, Problem *problem);
 void material_measurement_clear(MaterialMeasurement *measurement);
-// Newest first, at most `max` of one material, those before `before`. Their documents are without
-// drops and traces, which are counted.
+// Newest first, at most `max` of one material, those before `before`, without their documents.
 Status db_measurement_heads(Db *db, const char *slug, uint64_t before, size_t max,
                             MaterialMeasurements *measurements, Problem *problem);
 void material_measurements_clear(MaterialMeasurements *measurements);

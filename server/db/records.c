@@ -40,12 +40,15 @@ static const SqlColumn record_columns[] = {
 const CheckedTable records_table = CHECKED_TABLE("records", record_columns, RecordRow);
 
 typedef struct Samples {
-    const char *name;
+    char *name;
     StoredBytes samples;
 } Samples;
 static const SqlColumn samples_columns[] = {
-    COLUMN(Samples, name), COLUMN_WITH(Samples, samples, COLUMN_CHECKED), COLUMN_END};
-const CheckedTable samples_table = CHECKED_TABLE("record_samples", samples_columns, Samples);
+    COLUMN_OF(Samples, name, "name", COLUMN_ID | COLUMN_BOUND, "name"),
+    COLUMN_WITH(Samples, samples, COLUMN_CHECKED), COLUMN_END};
+const CheckedTable samples_table = CHECKED_TABLE_WITH(
+    "record_samples", samples_columns, Samples,
+    ", (SELECT name FROM records r WHERE r.number = record_samples.number) AS name");
 
 static const char one_sql[] = "SELECT {columns} FROM records WHERE name = :name";
 
@@ -152,7 +155,7 @@ static Status record_apply_add(Sqlite *database, const void *work, Problem *prob
                            "are kept; delete some that nothing uses",
                            (unsigned long long)counted.bytes, (unsigned long long)RECORDS_SAMPLES);
     TRY(sqlite_change(database, head_sql, record_columns, row, NULL, problem));
-    const Samples body = {row->name,
+    const Samples body = {(char *)(uintptr_t)row->name,
                           {adding->samples->at, adding->samples->count * sizeof(double)}};
     return sqlite_change(database, body_sql, samples_columns, &body, NULL, problem);
 }
@@ -190,18 +193,27 @@ Status db_record_twins(Db *db, const RecordRow *row, RecordRows *rows, Problem *
 // A copy owned by the caller, of exactly row->count numbers.
 static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, Problem *problem) {
     static const char sql[] =
-        "SELECT number, s.samples, s.checks FROM record_samples s JOIN records r USING "
+        "SELECT number, r.name, s.samples, s.checks FROM record_samples s JOIN records r USING "
         "(number) WHERE r.name = :name AND r.digest = :digest";
     const QueryKey key = {.name = row->name, .digest = row->digest};
     Samples found;
     TRY(db_get(db, sql, &key, samples_columns, &found, sizeof found, problem, no_record,
                row->name));
+    free(found.name);
     *samples = (Reals){found.samples.at, row->count};
-    if (found.samples.size == row->count * sizeof(double))
-        return STATUS_OK;
+    if (found.samples.size == row->count * sizeof(double)) {
+        char digest[RECORD_DIGEST_SIZE];
+        record_digest(row->interval, samples, digest);
+        if (strcmp(digest, row->digest) == 0)
+            return STATUS_OK;
+    }
     free(samples->at);
     *samples = (Reals){NULL, 0};
-    return problem_set(problem, STATUS_INTERNAL, "the record \"%.64s\" is not whole", row->name);
+    return problem_set(
+        problem, STATUS_INTERNAL,
+        "the record \"%.64s\" is damaged: its samples differ from their digest; put a "
+        "backup in its place (impactd restore)",
+        row->name);
 }
 
 Status db_record_named(Db *db, const char *name, NamedRecord **named, Problem *problem) {

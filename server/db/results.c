@@ -9,8 +9,8 @@
 
 // clang-format off
 static const SqlColumn result_columns[] = {
-    COLUMN_WITH(ResultRow, id, COLUMN_ID),
-    COLUMN(ResultRow, engine),
+    COLUMN_WITH(ResultRow, id, COLUMN_ID | COLUMN_BOUND),
+    COLUMN_WITH(ResultRow, engine, COLUMN_BOUND),
     COLUMN_WITH(ResultRow, sample_rate, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, count, COLUMN_CHECKED),
     COLUMN_WITH(ResultRow, created_unix_ms, COLUMN_CHECKED),
@@ -180,8 +180,11 @@ typedef struct Blob {
 } Blob;
 
 static const SqlColumn series_columns[] = {
-    COLUMN(Blob, result), COLUMN_WITH(Blob, body, COLUMN_CHECKED), COLUMN(Blob, bytes), COLUMN_END};
-const CheckedTable series_table = CHECKED_TABLE("series_bodies", series_columns, Blob);
+    COLUMN_OF(Blob, result, "result", COLUMN_ID | COLUMN_BOUND, "result"),
+    COLUMN_WITH(Blob, body, COLUMN_CHECKED), COLUMN(Blob, bytes), COLUMN_END};
+const CheckedTable series_table = CHECKED_TABLE_WITH(
+    "series_bodies", series_columns, Blob,
+    ", (SELECT result FROM series s WHERE s.number = series_bodies.number) AS result");
 
 static const char sum_sql[] =
     "SELECT count(*) AS count, coalesce(sum(bytes), 0) AS bytes FROM series";
@@ -255,15 +258,21 @@ static void series_touch_done(void *context, Status status, const char *detail) 
 
 Status db_series_load(Db *db, const char *result, char **body, size_t *size, Problem *problem) {
     static const char sql[] =
-        "SELECT number, body, checks FROM series JOIN series_bodies USING (number) "
+        "SELECT number, result, body, checks FROM series JOIN series_bodies USING (number) "
         "WHERE result = :result";
-    Blob blob = {.bytes = 0}, *used = calloc(1, sizeof *used);
+    Blob blob = {.bytes = 0}, found = {.bytes = 0}, *used = calloc(1, sizeof *used);
     bool is_found = false;
     text_fit(blob.result, sizeof blob.result, result);
     Status status =
-        db_first(db, sql, series_columns, &blob, series_columns, &blob, &is_found, problem);
-    *body = blob.body.at;
-    *size = blob.body.size;
+        db_first(db, sql, series_columns, &blob, series_columns, &found, &is_found, problem);
+    if (status == STATUS_OK)
+        status = db_require_name(found.result, result, problem);
+    if (status != STATUS_OK) {
+        free(found.body.at);
+        found.body = (StoredBytes){NULL, 0};
+    }
+    *body = found.body.at;
+    *size = found.body.size;
     if (status == STATUS_OK && is_found && used != NULL) {
         used->write.done = (WriteDone){series_touch_done, used};
         text_fit(used->result, sizeof used->result, result);

@@ -51,6 +51,13 @@ static Status report_full(const char *path, Problem *problem) {
                        left > (1 << 26) ? ", so a quota or a limit on files is reached" : "");
 }
 
+// What SQLite says of a damaged file may have bytes of it.
+static void text_make_ascii(char *text) {
+    for (; *text != '\0'; text++)
+        if (*text < ' ' || *text > '~')
+            *text = '?';
+}
+
 // What SQLite says, in words and as a status.
 static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     static const struct {
@@ -64,6 +71,9 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     const bool has_path = path != NULL && path[0] != '\0';
     const int code = sqlite3_errcode(connection) & 0xFF;
     Status status = STATUS_IO;
+    char message[200];
+    snprintf(message, sizeof message, "%s", sqlite3_errmsg(connection));
+    text_make_ascii(message);
     for (size_t i = 0; i < COUNT(known); i++)
         if (known[i].code == code)
             status = known[i].status;
@@ -77,8 +87,8 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
             problem, status,
             "%s is damaged, or no database of SQLite (%s): put a copy of it back, or "
             "move it away, with the files next to it, to start with a new database",
-            path, sqlite3_errmsg(connection));
-    return problem_set(problem, status, "%s failed: %s%s%s", doing, sqlite3_errmsg(connection),
+            path, message);
+    return problem_set(problem, status, "%s failed: %s%s%s", doing, message,
                        has_path ? ", in " : "", has_path ? path : "");
 }
 
@@ -150,7 +160,8 @@ static bool sql_has_column(char kind, const SqlColumn *column) {
     case 'h': // {head}
         return (column->flags & COLUMN_LONG) == 0;
     case 'k': // {checked}
-        return column->read == NULL && (column->flags & (COLUMN_CHECKED | COLUMN_ID)) != 0;
+        return column->read == NULL &&
+               (column->flags & (COLUMN_CHECKED | COLUMN_BOUND | COLUMN_ID)) != 0;
     default: // {columns}
         return true;
     }
@@ -275,13 +286,18 @@ static uint32_t column_check(const SqlColumn *column, const char *member) {
     return size > 0 ? gzip_crc32(0, at, size) : 0;
 }
 
+// The order of checks: the bound columns follow the others.
+static const int check_flags[] = {COLUMN_CHECKED, COLUMN_BOUND};
+
 static int bind_checks(sqlite3_stmt *statement, int index, const SqlColumn *columns,
                        const char *item) {
     uint32_t checks[PARAMETERS];
     int count = 0;
-    for (; columns->name != NULL && count < PARAMETERS; columns++)
-        if ((columns->flags & COLUMN_CHECKED) != 0)
-            checks[count++] = column_check(columns, item + columns->offset);
+    for (size_t i = 0; i < COUNT(check_flags); i++)
+        for (const SqlColumn *column = columns; column->name != NULL && count < PARAMETERS;
+             column++)
+            if ((column->flags & check_flags[i]) != 0)
+                checks[count++] = column_check(column, item + column->offset);
     return sqlite3_bind_blob(statement, index, checks, 4 * count, SQLITE_TRANSIENT);
 }
 
@@ -420,7 +436,8 @@ static void free_owned(const SqlColumn *column, void *item) {
 // a stored "labels" of table jobs (id j-...) differs from its checksum
 static void damage_describe(Statement *statement, const SqlColumn *column, const char *fault,
                             char damage[DAMAGE_SIZE]) {
-    const char *table = sqlite3_column_table_name(statement->handle, statement->checks);
+    const int place = statement->checks >= 0 ? statement->checks : 0;
+    const char *table = sqlite3_column_table_name(statement->handle, place);
     char row[160] = "";
     for (int i = 0; i < statement->result_count; i++) {
         const char *name = sqlite3_column_name(statement->handle, i);
@@ -433,6 +450,7 @@ static void damage_describe(Statement *statement, const SqlColumn *column, const
     }
     snprintf(damage, DAMAGE_SIZE, "a stored \"%s\" of table %s%s%s %s", column->name,
              table != NULL ? table : "?", row, row[0] != '\0' ? ")" : "", fault);
+    text_make_ascii(damage);
 }
 
 // Also logged: readers of parts of a page do not look into its problem.
@@ -448,31 +466,49 @@ static Status report_damage(Statement *statement, const char *damage, Problem *p
     return problem_set(problem, STATUS_INTERNAL, "%s", detail);
 }
 
+static bool statement_reads(const Statement *statement, const SqlColumn *column) {
+    for (int i = 0; i < statement->result_count; i++)
+        if (statement->results[i] == column)
+            return true;
+    return false;
+}
+
 // Compares what was read of the row with its checks, which are those of all checked columns.
 static bool row_is_damaged(Statement *statement, const SqlColumn *columns, const void *item,
                            char damage[DAMAGE_SIZE]) {
+    for (int i = 0; i < statement->result_count; i++) {
+        const SqlColumn *column = statement->results[i];
+        if (column != NULL && column->kind == COLUMN_TEXT &&
+            (column->flags & (COLUMN_ID | COLUMN_BOUND)) != 0 &&
+            *(char *const *)((const char *)item + column->offset) == NULL) {
+            damage_describe(statement, column, "is missing", damage);
+            return true;
+        }
+    }
     if (statement->checks < 0)
         return false;
     const char *checks = sqlite3_column_blob(statement->handle, statement->checks);
     const size_t size = (size_t)sqlite3_column_bytes(statement->handle, statement->checks);
     size_t at = 0;
-    for (const SqlColumn *column = columns; column->name != NULL; column++) {
-        if ((column->flags & COLUMN_CHECKED) == 0)
-            continue;
-        uint32_t check;
-        if (at + sizeof check > size) {
-            damage_describe(statement, column, "has no checksum", damage);
-            return true;
-        }
-        memcpy(&check, checks + at, sizeof check);
-        at += sizeof check;
-        for (int i = 0; i < statement->result_count; i++)
-            if (statement->results[i] == column &&
+    for (size_t pass = 0; pass < COUNT(check_flags); pass++)
+        for (const SqlColumn *column = columns; column->name != NULL; column++) {
+            if ((column->flags & check_flags[pass]) == 0)
+                continue;
+            uint32_t check;
+            if (at + sizeof check > size) {
+                if (check_flags[pass] == COLUMN_BOUND)
+                    return false; // of an earlier version
+                damage_describe(statement, column, "has no checksum", damage);
+                return true;
+            }
+            memcpy(&check, checks + at, sizeof check);
+            at += sizeof check;
+            if (statement_reads(statement, column) &&
                 check != column_check(column, (const char *)item + column->offset)) {
                 damage_describe(statement, column, "differs from its checksum", damage);
                 return true;
             }
-    }
+        }
     return false;
 }
 
@@ -895,18 +931,27 @@ Status sqlite_copy(Sqlite *from, Sqlite *to, const Progress *watch, Problem *pro
     return sqlite_execute(to, "PRAGMA journal_mode = MEMORY", problem);
 }
 
-Status sqlite_check(Sqlite *database, Problem *problem) {
-    static const char sql[] = "SELECT integrity_check AS text FROM pragma_integrity_check(1)";
+Status sqlite_check(Sqlite *database, void (*report_found)(void *context, const char *damage),
+                    void *context, uint64_t *count, Problem *problem) {
+    static const char sql[] = "SELECT integrity_check AS text FROM pragma_integrity_check(100)";
     typedef struct Verdict {
         char text[256];
     } Verdict;
     static const SqlColumn columns[] = {COLUMN(Verdict, text), COLUMN_END};
-    Verdict verdict = {"it cannot be checked"};
-    bool is_found;
-    TRY(sqlite_first(database, sql, NULL, NULL, columns, &verdict, &is_found, problem));
-    return strcmp(verdict.text, "ok") == 0
-               ? STATUS_OK
-               : problem_set(problem, STATUS_IO, "the database is damaged (%s)", verdict.text);
+    struct {
+        Verdict *at;
+        size_t count;
+    } found;
+    *count = 0;
+    TRY(sqlite_list(database, sql, NULL, NULL, columns, sizeof *found.at, &found, problem));
+    for (size_t i = 0; i < found.count; i++)
+        if (strcmp(found.at[i].text, "ok") != 0) {
+            text_make_ascii(found.at[i].text);
+            report_found(context, found.at[i].text);
+            ++*count;
+        }
+    free(found.at);
+    return STATUS_OK;
 }
 
 static int ask(void *watch) {

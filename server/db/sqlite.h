@@ -37,8 +37,12 @@ enum {
     // they differ, or there is none, the row cannot be read, unless it has a member `is_damaged`,
     // which is set then.
     COLUMN_CHECKED = 4,
-    COLUMN_ID = 8,    // names the row in reports of damage
+    COLUMN_ID = 8,    // names the row in reports of damage; never NULL
     COLUMN_KEPT = 16, // {set} leaves it as it is where the member is NULL
+    // Like COLUMN_CHECKED, never NULL, never changed, and stored behind those: rows of earlier
+    // versions lack it. For names, so that a damaged index does not lead to the row of another one
+    // unnoticed.
+    COLUMN_BOUND = 32,
 };
 
 // One member of a stored struct.
@@ -86,9 +90,11 @@ typedef struct CheckedTable {
     const SqlColumn *columns;
     size_t size; // of the struct
 } CheckedTable;
-#define CHECKED_TABLE(name_, columns_, Type)                                                       \
+#define CHECKED_TABLE(name_, columns_, Type) CHECKED_TABLE_WITH(name_, columns_, Type, "")
+// `more`: further columns, from other tables.
+#define CHECKED_TABLE_WITH(name_, columns_, Type, more)                                            \
     {                                                                                              \
-        .name = name_, .sql = "SELECT {checked} FROM " name_, .columns = columns_,                 \
+        .name = name_, .sql = "SELECT {checked}" more " FROM " name_, .columns = columns_,         \
         .size = sizeof(Type)                                                                       \
     }
 
@@ -125,7 +131,8 @@ uint64_t sqlite_rows_changed(Sqlite *database);
 //                                           checked columns of `keys` are the first of the row's
 //     {columns}   a, b                      all of `columns`, with their checks
 //     {head}      a, b                      the same without those that are COLUMN_LONG
-//     {checked}   number, a, b              those that are COLUMN_CHECKED, with their checks
+//     {checked}   number, a, b              those that are COLUMN_CHECKED, _BOUND or _ID, with
+//                                           their checks
 
 // Runs one statement without rows. *changes (may be NULL): rows changed.
 Status sqlite_change(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
@@ -164,8 +171,10 @@ Status sqlite_read_part(Sqlite *database, const char *table, const char *column,
 // Fills `to` with all that is in `from` at this moment, while others write to that. `watch` (NULL
 // is allowed) gets the progress; STATUS_CANCELLED when it stops.
 Status sqlite_copy(Sqlite *from, Sqlite *to, const Progress *watch, Problem *problem);
-// SQLite's check of the whole file; STATUS_IO with what it found.
-Status sqlite_check(Sqlite *database, Problem *problem);
+// SQLite's check of the whole file, indices included. `report` gets what it finds, at most a
+// hundred sentences; *count is their number.
+Status sqlite_check(Sqlite *database, void (*report)(void *context, const char *damage),
+                    void *context, uint64_t *count, Problem *problem);
 // Until NULL is given, long statements ask `watch` whether to continue; STATUS_CANCELLED if not.
 void sqlite_watch(Sqlite *database, const Progress *watch);
 

@@ -59,10 +59,14 @@ Status db_sweep_begin(Db *db, SweepRow *row, Problem *problem) {
 
 Status db_sweep_load(Db *db, const char *result, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT {columns} FROM sweeps WHERE result = :id";
-    return db_get(db, sql, &(QueryKey){.id = result}, sweep_columns, row, sizeof *row, problem,
-                  "there is no table of \"%.72s\": either no such result, or its scene asked for "
-                  "no sweep",
-                  result);
+    TRY(db_get(db, sql, &(QueryKey){.id = result}, sweep_columns, row, sizeof *row, problem,
+               "there is no table of \"%.72s\": either no such result, or its scene asked for "
+               "no sweep",
+               result));
+    const Status status = db_require_name(row->result, result, problem);
+    if (status != STATUS_OK)
+        sweep_row_clear(row);
+    return status;
 }
 
 Status db_sweep_asked(Db *db, const char *job, SweepRow *row, Problem *problem) {
@@ -98,6 +102,19 @@ Status db_sweep_chunk(Db *db, int64_t sweep, uint64_t number, SweepChunkRow *chu
     TRY(db_first(db, sql, chunk_columns, &key, chunk_columns, chunk, &is_found, problem));
     return is_found ? STATUS_OK
                     : problem_set(problem, STATUS_NOT_FOUND, "the chunk is not there yet");
+}
+
+static Status sweep_apply_compare(Sqlite *database, const void *key, Problem *problem) {
+    static const CheckedTable chunks = {
+        .sql = "SELECT {checked} FROM sweep_chunks WHERE sweep = :sweep",
+        .columns = chunk_columns,
+        .size = sizeof(SweepChunkRow)};
+    TableCheck check = {.keys = chunk_columns, .key = key};
+    return sqlite_check_table(database, &chunks, &check, problem);
+}
+
+Status db_sweep_compare(Db *db, int64_t sweep, Problem *problem) {
+    return db_read(db, sweep_apply_compare, &(SweepChunkRow){.sweep = sweep}, problem);
 }
 
 static Status sweep_check_row(Sqlite *database, const char *sql, const SqlColumn *columns,

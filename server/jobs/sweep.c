@@ -178,7 +178,17 @@ Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, S
     if (view->row.chunks > 0 && view->row.metrics != sweep_view_study(view)->metrics.count)
         return problem_set(problem, STATUS_INTERNAL,
                            "the stored rows no longer belong to this scene");
+    // In this order: a result is saved after its chunks.
+    const bool is_finished = db_result_exists(db, view->row.result);
     TRY(db_sweep_chunks(db, view->row.number, &view->chunks, problem));
+    if (is_finished && view->chunks.count < view->row.chunks)
+        return problem_set(problem, STATUS_INTERNAL,
+                           "the database is damaged: %llu of %llu parts of the table of %.72s are "
+                           "missing; put a backup in its place (impactd restore)",
+                           (unsigned long long)(view->row.chunks - view->chunks.count),
+                           (unsigned long long)view->row.chunks, view->row.result);
+    if (has_failures) // the whole table
+        TRY(db_sweep_compare(db, view->row.number, problem));
     view->is_complete = view->row.chunks > 0 && view->chunks.count == view->row.chunks;
     for (size_t i = 0; i < view->chunks.count; i++) {
         view->is_complete = view->is_complete && !view->chunks.at[i].is_open;

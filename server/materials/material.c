@@ -73,11 +73,14 @@ void stored_test_clear(StoredTest *stored) {
 }
 
 // A fault is the database's, not the client's.
+// Of a row of a list, which has no document, its head.
 static Status stored_test_read(const MaterialMeasurement *row, DropTest *test, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the measurement");
-    Status status = json_parse(row->document, strlen(row->document), drop_test_fields, test, fault);
+    const char *text = row->document != NULL ? row->document : row->head;
+    Status status = text != NULL ? json_parse(text, strlen(text), drop_test_fields, test, fault)
+                                 : STATUS_INTERNAL;
     if (status != STATUS_OK)
         status = problem_set(problem, status == STATUS_NO_MEMORY ? status : STATUS_INTERNAL,
                              "measurement %llu of \"%.63s\" cannot be read: %s",
