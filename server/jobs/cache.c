@@ -190,6 +190,14 @@ static Status series_prepare(JobManager *manager, Task *task, Problem *problem) 
     if (status == STATUS_OK)
         status = jobs_prepare_stored(manager->db, row.scene, task->result, &task->inquiry, &is_same,
                                      problem);
+    // It was resolved when it was submitted, and what a result names is never deleted.
+    if (status == STATUS_INVALID || status == STATUS_NOT_FOUND) {
+        problem_clear(problem);
+        status = problem_set(problem, STATUS_INTERNAL,
+                             "a material or record that %.72s names cannot be found: the database "
+                             "is damaged; put a backup in its place (impactd restore)",
+                             task->result);
+    }
     if (status == STATUS_OK && !is_same)
         status = problem_set(problem, STATUS_INTERNAL,
                              "the stored scene no longer belongs to this result");

@@ -24,7 +24,7 @@ import program  # noqa: E402
 
 OPTIONS = ("--workers", "2")
 PAGE = 16384
-REFUSED = (400, 401, 404, 409, 410, 422, 500, 503, 507)
+REFUSED = (404, 409, 410, 500, 503)
 
 
 def fill(folder, with_wal):
