@@ -181,8 +181,9 @@ static Status series_report_failure(JobManager *manager, const char *result, Pro
 static Status series_prepare(JobManager *manager, Task *task, Problem *problem) {
     ResultRow row = {0};
     bool is_same = true;
-    Status status = db_result_scene(manager->db, task->result, &row, problem);
-    if (status == STATUS_OK && strcmp(row.engine, engine_version) != 0)
+    TRY(db_result_scene(manager->db, task->result, &row, problem));
+    Status status = STATUS_OK;
+    if (strcmp(row.engine, engine_version) != 0)
         status = problem_set(problem, STATUS_GONE,
                              "the series was made by %s, this is %s: to have it again, POST to "
                              "/v1/results/%.72s/again, which submits the scene again",
