@@ -175,7 +175,7 @@ part_browser() {
     done
 }
 
-# 1200 s of CPU.
+# 900 s of CPU.
 part_coverage() {
     build coverage
     sized 'run cache' run "$python" tests/coverage.py --build build-coverage

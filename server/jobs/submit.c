@@ -504,10 +504,10 @@ static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Pro
                            "the job %.40s is not finished: its failed points can be made again "
                            "when it is",
                            id);
-    TRY(db_sweep_load(manager->db, result, row, problem));
     if (!db_result_exists(manager->db, result))
         return problem_set(problem, STATUS_CONFLICT,
-                           "the sweep was not brought to an end: submit its scene again");
+                           "the job %.40s has no result: submit its scene again", id);
+    TRY(db_sweep_load(manager->db, result, row, problem));
     Status status =
         jobs_prepare_stored(manager->db, row->scene, row->result, &request, &is_same, problem);
     if (status == STATUS_OK && !is_same)

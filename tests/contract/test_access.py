@@ -255,7 +255,7 @@ def climb(daemon, secret):
             continue  # a good name
         for path, body in ((f"/v1/records?interval=0.01&unit=g&name={payload}", {"samples": [1, 2, 3]}),
                            ("/v1/materials", {"slug": payload, "name": "x", "restitution": 0.5, "contact_time": 0.01}),
-                           ("/v1/jobs", sponge(excitation={"type": "record", "record": payload}))):
+                           ("/v1/jobs", sponge(excitation={"kind": "record", "name": payload}))):
             reply = daemon.request("POST", path, json=body)
             count += 1
             wrong += [] if 400 <= reply.status < 500 else [(path, payload, reply)]

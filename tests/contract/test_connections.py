@@ -2,8 +2,11 @@
 """Connections that bring nothing: chunk headers that never fit, and idle clients where few files may be open; what is listened on."""
 
 import os
+import re
 import resource
+import shutil
 import socket
+import subprocess
 import sys
 import tempfile
 import time
@@ -87,6 +90,32 @@ def test_each_kind_of_loopback_is_served_and_a_taken_port_is_reported():
         token(folder, "lab")
         code, _, said = program.run("serve", "--listen", "192.0.2.1:0", "--data", folder)
         assert code == 1 and "cannot listen on 192.0.2.1" in said, (code, said)
+
+
+def test_a_soft_limit_of_open_files_is_raised():
+    """A daemon that may open more files than its soft limit says opens more."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 256), hard))
+    try:
+        with program.daemon() as daemon:
+            assert resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE) == (hard, hard)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_an_expired_certificate_is_refused():
+    """With the time at which it expired; so is a file without one."""
+    if shutil.which("openssl") is None:
+        raise program.Skipped("openssl is not installed")
+    with tempfile.TemporaryDirectory() as folder:
+        cert, key, asked = (os.path.join(folder, name) for name in ("cert.pem", "key.pem", "request.pem"))
+        for command in (["req", "-new", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", asked, "-subj", "/CN=localhost"],
+                        ["x509", "-req", "-in", asked, "-signkey", key, "-days", "-1", "-out", cert]):
+            subprocess.run(["openssl", *command], check=True, capture_output=True)
+        os.chmod(key, 0o600)
+        for path, reason in ((cert, r"expired at \d{4}-\d\d-\d\dT.*; renew it"), (asked, "must be a certificate and its key")):
+            code, _, said = program.run("serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", path, "--tls-key", key)
+            assert code == 2 and re.search(reason, said), (code, said)
 
 
 if __name__ == "__main__":

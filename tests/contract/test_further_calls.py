@@ -261,5 +261,18 @@ def test_a_preview_is_the_result_and_is_stored_nowhere():
         assert [reply.status for reply in replies] == [200] * 3 + [429] and int(replies[3].headers["retry-after"]) > 0, replies
 
 
+def test_a_sweep_is_made_again_only_when_it_was_finished():
+    """While it runs, and once it was dismissed: 409 with what to do."""
+    with program.daemon() as daemon:
+        axis = {"pointer": "/dampers/0/clearance", "from": 0.005, "to": 0.02, "count": 3000}
+        long = sponge(duration=300, study={"kind": "sweep", "axes": [axis]})
+        job = "/v1/jobs/" + daemon.submit(long, headers={"Prefer": "respond-async"}).json()["id"]
+        assert until(lambda: daemon.get(job + "/table.json").json().get("done", 0) > 0)
+        assert "is not finished" in problem(daemon.request("POST", job + "/retry"), 409)["detail"]
+        assert daemon.request("DELETE", job).status == 200
+        assert until(lambda: daemon.get(job).json()["status"] == "dismissed")
+        assert "submit its scene again" in problem(daemon.request("POST", job + "/retry"), 409)["detail"]
+
+
 if __name__ == "__main__":
     program.main(globals())
