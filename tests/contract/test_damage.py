@@ -78,6 +78,26 @@ def test_an_entry_without_a_name_does_not_end_the_daemon():
         assert program.run("check-db", "--data", folder)[0] == 1
 
 
+def test_a_file_that_is_cut_or_overwritten_while_it_is_read_does_not_end_the_daemon():
+    """Answers are right or problems, and the daemon ends when it is asked to."""
+    for cut in (True, False):
+        with tempfile.TemporaryDirectory() as folder:
+            targets = damage.fill(folder, False)
+            path = os.path.join(folder, "impactd.db")
+            with program.Daemon(program.build, data=folder) as daemon:
+                right = {target: daemon.get(target).body for target in targets}
+                size = os.path.getsize(path)
+                if cut:
+                    os.truncate(path, 3 * damage.PAGE)
+                else:
+                    damage.overwrite(path, damage.PAGE, bytes(size - damage.PAGE))
+                for target in targets:
+                    reply = daemon.get(target)
+                    assert reply.status in damage.REFUSED or reply.body == right[target], (target, reply)
+                assert daemon.is_alive(), daemon.stderr()
+                daemon.stop(60)
+
+
 def changed(folder, sql):
     connection = sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)
     for name, in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'trigger' AND name LIKE '%keep'").fetchall():
