@@ -53,6 +53,7 @@ class Recording:
         self.chance = random.Random(seed)
         self.acknowledged, self.submitted, self.posted = [], [], 0
         self.lock = threading.Lock()
+        self.restoring = None  # where a restore began and ended, and the jobs of both databases
         self.token = self.reviewer = None
         self.daemon = None
         recorder = os.path.join(program.build, "tests", "librecorder.so")
@@ -231,8 +232,30 @@ class Recording:
         self.stop(with_signal)
 
 
+    def jobs(self):
+        # After a daemon's end all is in the one file; opened otherwise, SQLite would make the others, unrecorded.
+        connection = sqlite3.connect(f"file:{os.path.join(self.folder, 'impactd.db')}?mode=ro&immutable=1", uri=True)
+        found = sorted(row[0] for row in connection.execute("SELECT id FROM jobs"))
+        connection.close()
+        return found
+
+    def back_up(self):
+        """What is acknowledged now is what a restore has to bring back."""
+        copied = [one for one in self.acknowledged if one.end is None]
+        self.command("backup", os.path.join(self.folder, "copy.db"))
+        return copied, self.jobs()
+
+    def restore(self, copied, jobs):
+        present, begin = self.jobs(), self.place()
+        for one in self.acknowledged:
+            one.end = begin if one.end is None else one.end
+        self.command("restore", os.path.join(self.folder, "copy.db"), "--force")
+        self.restoring = (begin, self.place(), present, jobs)
+        self.acknowledged += [Acknowledged(self.place(), one.what, one.key, one.value) for one in copied]
+
+
 def record(folder, log, scenes, seed):
-    """Three daemons after one another in an empty folder."""
+    """Three daemons after one another in an empty folder, a backup after the first and its restore after the last."""
     recording = Recording(folder, log, seed)
     recording.token, recording.reviewer = (recording.command("token", "create", "--name", name, "--scopes", "admin") for name in ("lab", "reviewer"))
     recording.acknowledge(recording.place(), TOKEN, "reviewer")
@@ -240,6 +263,8 @@ def record(folder, log, scenes, seed):
     try:
         for number, end in enumerate(ends):
             recording.life(1 + number * scenes, scenes, end)
+            copy = recording.back_up() if number == 0 else copy
+        recording.restore(*copy)
     finally:
         if recording.daemon is not None:
             recording.daemon.kill()
