@@ -34,11 +34,12 @@ static Status result_read(const char *document, const char *what, const Field *f
     }
     const Status status = json_parse(document, strlen(document), fields, item, fault);
     // A fault here is the server's, not the client's.
-    if (status != STATUS_OK)
-        problem_set(problem, STATUS_INTERNAL, "the stored %s cannot be read: %s", what,
-                    fault->detail);
+    const Status reported =
+        status == STATUS_OK || status == STATUS_NO_MEMORY ? status : STATUS_INTERNAL;
+    if (reported != STATUS_OK)
+        problem_set(problem, reported, "the stored %s cannot be read: %s", what, fault->detail);
     free(fault);
-    return status == STATUS_OK ? STATUS_OK : STATUS_INTERNAL;
+    return reported;
 }
 
 // The scene as it was run, from its canonical JSON. Cleared by study_request_clear in any case.

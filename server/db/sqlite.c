@@ -618,6 +618,13 @@ Status sqlite_change(Sqlite *database, const char *sql, const SqlColumn *keys, c
     return status;
 }
 
+Status sqlite_prepare(Sqlite *database, const char *const *texts, Problem *problem) {
+    Statement *statement;
+    for (; *texts != NULL; texts++)
+        TRY(statement_find(database, *texts, NULL, NULL, &statement, problem));
+    return STATUS_OK;
+}
+
 Status sqlite_first(Sqlite *database, const char *sql, const SqlColumn *keys, const void *item,
                     const SqlColumn *columns, void *target, bool *is_found, Problem *problem) {
     Statement *statement;

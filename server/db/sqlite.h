@@ -110,6 +110,9 @@ Status sqlite_is_current(Sqlite *database, const EmbeddedFile *files, bool *is_c
 
 // Runs SQL that has neither parameters nor rows; any number of statements.
 Status sqlite_execute(Sqlite *database, const char *sql, Problem *problem);
+// Prepares texts without parameters for sqlite_change, up to NULL: without memory later on, they
+// still run.
+Status sqlite_prepare(Sqlite *database, const char *const *texts, Problem *problem);
 // Writes the first page as it is, to see whether writing works. Within a transaction.
 Status sqlite_touch(Sqlite *database, Problem *problem);
 // Whether a transaction is open. A failed write may have ended it.

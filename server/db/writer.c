@@ -60,6 +60,20 @@ struct Db {
     Problem problem; // of the current write; the writer's own, for it is large
 };
 
+// Prepared when a connection is opened, so that a transaction can end without memory. An open one
+// would make all later ones fail, and a reader would go on with old rows.
+static const char sql_read[] = "BEGIN", sql_begin[] = "BEGIN IMMEDIATE", sql_commit[] = "COMMIT",
+                  sql_rollback[] = "ROLLBACK", sql_savepoint[] = "SAVEPOINT one",
+                  sql_rollback_one[] = "ROLLBACK TO one", sql_release[] = "RELEASE one";
+static const char *const sql_transaction[] = {sql_read,     sql_begin,     sql_commit,
+                                              sql_rollback, sql_savepoint, sql_rollback_one,
+                                              sql_release,  NULL};
+
+static void connection_rollback(Sqlite *database) {
+    if (sqlite_is_in_transaction(database))
+        (void)sqlite_change(database, sql_rollback, NULL, NULL, NULL, NULL);
+}
+
 static Sqlite *reader_take(Db *db) {
     pthread_mutex_lock(&db->lock);
     while (db->free_count == 0)
@@ -70,6 +84,7 @@ static Sqlite *reader_take(Db *db) {
 }
 
 static void reader_put(Db *db, Sqlite *database) {
+    connection_rollback(database);
     pthread_mutex_lock(&db->lock);
     db->readers[db->free_count++] = database;
     pthread_cond_signal(&db->some);
@@ -85,14 +100,18 @@ static void writer_set_status(PendingWrite *write, Status status, const Problem 
 }
 
 static Status writer_apply_saved(Db *db, Sqlite *database, PendingWrite *write) {
-    static const char open[] = "SAVEPOINT one", undo[] = "ROLLBACK TO one", end[] = "RELEASE one";
-    Status status = sqlite_change(database, open, NULL, NULL, NULL, &db->problem);
+    Status status = sqlite_change(database, sql_savepoint, NULL, NULL, NULL, &db->problem);
     if (status == STATUS_OK) {
         status = write->apply(database, write->work, &db->problem);
+        // Half a write must not be committed with the others: where it cannot be undone by itself,
+        // all is.
+        Status undone = STATUS_OK;
         if (status != STATUS_OK && sqlite_is_in_transaction(database))
-            (void)sqlite_change(database, undo, NULL, NULL, NULL, NULL);
-        if (sqlite_is_in_transaction(database))
-            (void)sqlite_change(database, end, NULL, NULL, NULL, NULL);
+            undone = sqlite_change(database, sql_rollback_one, NULL, NULL, NULL, NULL);
+        if (undone == STATUS_OK && sqlite_is_in_transaction(database))
+            undone = sqlite_change(database, sql_release, NULL, NULL, NULL, NULL);
+        if (undone != STATUS_OK)
+            connection_rollback(database);
     }
     return status;
 }
@@ -101,12 +120,11 @@ static Status writer_apply_saved(Db *db, Sqlite *database, PendingWrite *write) 
 // db->problem then has the reason. Without savepoints one failure rolls back all.
 static bool writer_commit(Db *db, Sqlite *database, PendingWrite *first, const PendingWrite *end,
                           bool has_savepoints) {
-    static const char begin[] = "BEGIN IMMEDIATE", commit[] = "COMMIT", undo[] = "ROLLBACK";
     const int64_t began_ns = clock_monotonic_ns();
     const uint64_t rows = sqlite_rows_changed(database);
     uint64_t writes = 0;
     problem_clear(&db->problem);
-    Status status = sqlite_change(database, begin, NULL, NULL, NULL, &db->problem);
+    Status status = sqlite_change(database, sql_begin, NULL, NULL, NULL, &db->problem);
     if (status == STATUS_OK)
         status = sqlite_check_place(database, &db->problem);
     for (PendingWrite *write = first; status == STATUS_OK && write != end; write = write->next) {
@@ -126,10 +144,10 @@ static bool writer_commit(Db *db, Sqlite *database, PendingWrite *first, const P
     }
     if (status == STATUS_OK) {
         problem_clear(&db->problem);
-        status = sqlite_change(database, commit, NULL, NULL, NULL, &db->problem);
+        status = sqlite_change(database, sql_commit, NULL, NULL, NULL, &db->problem);
     }
-    if (status != STATUS_OK && sqlite_is_in_transaction(database))
-        (void)sqlite_change(database, undo, NULL, NULL, NULL, NULL);
+    if (status != STATUS_OK)
+        connection_rollback(database);
     if (status == STATUS_OK) {
         atomic_store(&db->stats.is_failing, false);
         histogram_add(&db->stats.commits, clock_monotonic_ns() - began_ns);
@@ -273,13 +291,15 @@ static Status db_open_files(Db *db, const char *directory, bool is_beside,
     while (db->free_count < READERS) {
         TRY(sqlite_open(path, DATABASE_READER, &db->readers[db->free_count], problem));
         db->free_count++;
+        TRY(sqlite_prepare(db->readers[db->free_count - 1], sql_transaction, problem));
     }
-    return STATUS_OK;
+    return sqlite_prepare(db->own, sql_transaction, problem);
 }
 
 static Status db_open_memory(Db *db, const CheckedTable *const *tables, Problem *problem) {
     TRY(sqlite_open(NULL, DATABASE_WRITER, &db->readers[0], problem));
     db->free_count = 1;
+    TRY(sqlite_prepare(db->readers[0], sql_transaction, problem));
     return sqlite_migrate(db->readers[0], embedded_sql, tables, problem);
 }
 
@@ -379,10 +399,10 @@ bool db_is_private(const Db *db) {
 
 Status db_read(Db *db, DbApply *apply, const void *work, Problem *problem) {
     Sqlite *database = reader_take(db);
-    Status status = sqlite_execute(database, "BEGIN", problem);
+    Status status = sqlite_change(database, sql_read, NULL, NULL, NULL, problem);
     if (status == STATUS_OK) {
         status = apply(database, work, problem);
-        const Status ended = sqlite_execute(database, "COMMIT", NULL);
+        const Status ended = sqlite_change(database, sql_commit, NULL, NULL, NULL, NULL);
         status = status == STATUS_OK ? ended : status;
     }
     reader_put(db, database);

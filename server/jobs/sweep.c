@@ -75,17 +75,17 @@ static Status sweep_view_read_scene(SweepView *view, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
         return sweep_no_memory(problem);
-    const Status status = json_parse(view->row.scene, strlen(view->row.scene), study_request_fields,
-                                     &view->inquiry, fault);
+    Status status = json_parse(view->row.scene, strlen(view->row.scene), study_request_fields,
+                               &view->inquiry, fault);
     // A fault here is ours, not the client's.
     if (status != STATUS_OK)
-        problem_set(problem, STATUS_INTERNAL, "the stored scene cannot be read: %s", fault->detail);
+        status = problem_set(problem, status == STATUS_NO_MEMORY ? status : STATUS_INTERNAL,
+                             "the stored scene cannot be read: %s", fault->detail);
     // The scenes of points take their records from here; they report a record that is gone.
     if (status == STATUS_OK)
         (void)request_load_records(view->db, &view->inquiry, fault);
     free(fault);
-    if (status != STATUS_OK)
-        return STATUS_INTERNAL;
+    TRY(status);
     const Variant *study = view->inquiry.study;
     return study != NULL && study_kind(study) == &study_sweep
                ? STATUS_OK

@@ -148,8 +148,10 @@ static void diff_walk(Diff *diff, const char *pointer, const json_t *a, const js
 Status json_diff(const char *a, const char *b, const char *ignored, const DiffFormat *format,
                  Bytes *bytes, size_t *count, Problem *problem) {
     Diff diff = {.format = format, .bytes = bytes};
-    json_t *trees[2] = {json_loads(a, JSON_REJECT_DUPLICATES, NULL),
-                        json_loads(b, JSON_REJECT_DUPLICATES, NULL)};
+    json_t *trees[2];
+    bool is_out_of_memory = false;
+    trees[0] = json_parse_stored(a, &is_out_of_memory);
+    trees[1] = json_parse_stored(b, &is_out_of_memory);
     const bool are_read = trees[0] != NULL && trees[1] != NULL;
     if (are_read) {
         for (int i = 0; i < 2 && ignored != NULL; i++)
@@ -161,6 +163,8 @@ Status json_diff(const char *a, const char *b, const char *ignored, const DiffFo
     json_decref(trees[0]);
     json_decref(trees[1]);
     *count = diff.count;
+    if (is_out_of_memory)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory to compare two scenes");
     return are_read ? STATUS_OK
                     : problem_set(problem, STATUS_INTERNAL, "a stored scene cannot be read");
 }

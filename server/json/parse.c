@@ -877,6 +877,14 @@ Status json_parse_value(const char *text, size_t size, const Field *field, void 
     return part_status(&decoder, root, problem);
 }
 
+json_t *json_parse_stored(const char *text, bool *is_out_of_memory) {
+    json_t *root = NULL;
+    const Part part = {text, 0, strlen(text), "", STATUS_UNREADABLE};
+    if (part_parse(&part, &root, NULL) == STATUS_NO_MEMORY)
+        *is_out_of_memory = true;
+    return root;
+}
+
 json_t *json_parse_tree(const char *text, size_t size) {
     json_t *root = NULL;
     const size_t mark = size > 0 ? scan_mark(text, size) : 0;

@@ -33,6 +33,9 @@ Status json_parse_value(const char *text, size_t size, const Field *field, void 
 // The tree of a text that is a JSON object within the limits above, else NULL. For files of json/
 // alone: it is jansson's, released by json_decref.
 struct json_t *json_parse_tree(const char *text, size_t size);
+// The tree of a stored document, any value; NULL if it is damaged, or if memory ran out, which is
+// set then.
+struct json_t *json_parse_stored(const char *text, bool *is_out_of_memory);
 
 // Where blocks of jansson's memory come from: malloc, except in tests.
 extern void *(*json_memory_source)(size_t size);
