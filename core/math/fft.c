@@ -7,6 +7,9 @@
 #include <stdlib.h>
 
 enum { FFT_COSINES_BLOCK = 64 }; // angles of fft_cosines in a block
+// FFTW aborts where an allocation of its planner fails, so the memory for it is reserved first and
+// then returned to the allocator: bytes, and bytes for each sample.
+enum { FFT_PLANNER_BYTES = 1 << 16, FFT_PLANNER_SAMPLE_BYTES = 64 };
 enum { FFT_CACHE_SIZE_MAX = 1 << 17 };
 
 struct Fft {
@@ -31,7 +34,9 @@ Fft *fft_new(size_t size, FftDirection direction) {
     fft->direction = direction;
     fft->real = fftw_alloc_real(size);
     fft->complex = fftw_alloc_complex(size / 2 + 1);
-    if (fft->real != NULL && fft->complex != NULL)
+    void *reserve = malloc(FFT_PLANNER_BYTES + FFT_PLANNER_SAMPLE_BYTES * size);
+    free(reserve);
+    if (reserve != NULL && fft->real != NULL && fft->complex != NULL)
         fft->plan = direction == FFT_FORWARD
                         ? fftw_plan_dft_r2c_1d((int)size, fft->real, fft->complex, FFTW_ESTIMATE)
                         : fftw_plan_dft_c2r_1d((int)size, fft->complex, fft->real, FFTW_ESTIMATE);

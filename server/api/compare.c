@@ -114,10 +114,10 @@ static Status compare_resolve(App *app, const char *name, const char *id, char r
     JobView view = {0};
     if (strncmp(id, "j-", 2) != 0) {
         snprintf(result, 72, "%s", id);
-        return db_result_exists(app->db, result)
-                   ? STATUS_OK
-                   : problem_set(problem, STATUS_NOT_FOUND, "there is no result %.80s (\"%s\")", id,
-                                 name);
+        const Status found = db_result_find(app->db, result, problem);
+        return found != STATUS_NOT_FOUND
+                   ? found
+                   : problem_set(problem, found, "there is no result %.80s (\"%s\")", id, name);
     }
     TRY(jobs_find(app->manager, id, &job, problem));
     Status status = job_view(job, &view);

@@ -98,6 +98,7 @@ static void proposal_write_link(Bytes *bytes, const Request *request, const char
                  rest, query != NULL ? query : "");
     bytes_text(bytes, name);
     bytes_json_string(bytes, link.at);
+    bytes->is_failed = bytes->is_failed || link.is_failed;
     bytes_clear(&link);
 }
 

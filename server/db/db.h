@@ -173,6 +173,7 @@ Status db_result_scene(Db *db, const char *id, ResultRow *row, Problem *problem)
 // The same if the scene has at most `most` characters; STATUS_NOT_FOUND beyond.
 Status db_result_scene_within(Db *db, const char *id, size_t most, ResultRow *row,
                               Problem *problem);
+Status db_result_find(Db *db, const char *id, Problem *problem);
 bool db_result_exists(Db *db, const char *id);
 // A client other than `client` of whose finished jobs it is the result; "" if there is none.
 Status db_result_sharer(Db *db, const char *id, const char *client, char sharer[72],

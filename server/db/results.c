@@ -96,10 +96,14 @@ Status db_result_scene_within(Db *db, const char *id, size_t most, ResultRow *ro
     return db_get(db, sql, &key, result_columns, row, sizeof *row, problem, no_result, id);
 }
 
-bool db_result_exists(Db *db, const char *id) {
+Status db_result_find(Db *db, const char *id, Problem *problem) {
     static const char sql[] = "SELECT id FROM results WHERE id = :id";
     ResultRow row;
-    return result_load(db, sql, id, &row, NULL) == STATUS_OK;
+    return result_load(db, sql, id, &row, problem);
+}
+
+bool db_result_exists(Db *db, const char *id) {
+    return db_result_find(db, id, NULL) == STATUS_OK;
 }
 
 Status db_result_sharer(Db *db, const char *id, const char *client, char sharer[72],

@@ -1,5 +1,6 @@
 // Results in memory, and outcomes for readers of series: from memory, from the database where
 // computing it was expensive, else computed again, ahead of ordinary jobs and once for all readers.
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -135,8 +136,12 @@ static Status outcome_load(JobManager *manager, const char *result, Outcome **ou
     ResultRow row = {0};
     *outcome = NULL;
     TRY(db_result_outcome(manager->db, result, &row, problem));
+    errno = 0;
     *outcome = outcome_blob_read(row.outcome.at, row.outcome.size);
+    const bool is_out_of_memory = *outcome == NULL && errno == ENOMEM;
     result_row_clear(&row);
+    if (is_out_of_memory)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the stored result");
     return *outcome != NULL
                ? STATUS_OK
                : problem_set(problem, STATUS_INTERNAL, "the stored result cannot be read");

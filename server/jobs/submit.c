@@ -504,12 +504,13 @@ static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Pro
                            "the job %.40s is not finished: its failed points can be made again "
                            "when it is",
                            id);
-    if (!db_result_exists(manager->db, result))
+    Status status = db_result_find(manager->db, result, problem);
+    if (status == STATUS_NOT_FOUND)
         return problem_set(problem, STATUS_CONFLICT,
                            "the job %.40s has no result: submit its scene again", id);
+    TRY(status);
     TRY(db_sweep_load(manager->db, result, row, problem));
-    Status status =
-        jobs_prepare_stored(manager->db, row->scene, row->result, &request, &is_same, problem);
+    status = jobs_prepare_stored(manager->db, row->scene, row->result, &request, &is_same, problem);
     if (status == STATUS_OK && !is_same)
         status = problem_set(problem, STATUS_GONE,
                              "the sweep was made by another engine version, this is %s: POST to "

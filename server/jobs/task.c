@@ -244,8 +244,10 @@ ResultSummary *result_summary_new(const ResultRow *row) {
 
 Status result_summary_load(Db *db, const char *result, ResultSummary **summary, Problem *problem) {
     ResultRow row = {0};
-    const Status status = db_result_head(db, result, &row, problem);
+    Status status = db_result_head(db, result, &row, problem);
     *summary = status == STATUS_OK ? result_summary_new(&row) : NULL;
+    if (status == STATUS_OK && *summary == NULL)
+        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the result's summary");
     result_row_clear(&row);
     return status;
 }
