@@ -8,6 +8,7 @@
 #   threads     the thread sanitizer: unit tests of jobs, db and http, requests and cancels
 #   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
 #   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
+#   faults      every allocation and file call of the canonical requests fails in turn
 #   truth       the long campaigns of tests/truth
 #   storm       a million requests, 10,000 cancels
 #   fuzz        mutated ground motions and material files
@@ -19,7 +20,7 @@ set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
 
-all=(commit clang threads sanitized kills truth storm fuzz browser coverage package bench)
+all=(commit clang threads sanitized kills faults truth storm fuzz browser coverage package bench)
 is_quick=
 [ "${1-}" != --quick ] || { is_quick=1 && shift; }
 parts=("${@:-${all[@]}}")
@@ -117,6 +118,15 @@ part_kills() {
     sized '--states 20 --scenes 5 --daemons 2' '--states 1500 --scenes 60 --daemons 100' "$python" tests/power/power.py --build build
     # Damaged bytes, pages, indices and logs: right answers or problems, no end of the daemon. 100 s
     sized '--copies 10' '--copies 500' "$python" tests/damage/damage.py --build build
+}
+
+part_faults() {
+    build release
+    build debug
+    local kind
+    # Every N, once and from N on. 600 s
+    for kind in allocations EIO ENOSPC short; do sized '--stride 100' '--stride 1' "$python" tests/faults/inject.py --build build "$kind"; done
+    sized '--stride 200' '--stride 7' "$python" tests/faults/inject.py --build build-debug allocations
 }
 
 # Scenes and seed first.
