@@ -98,3 +98,9 @@ export function moment(text) {
 
 // "r-a29adbf1…": enough to tell it by.
 export const brief = (id) => (id.length > 14 ? `${id.slice(0, 10)}…` : id);
+
+// A metric of a summary, null where it is not known: impulses have no force.
+export const metricOf = (summary, name) =>
+  name === "peak_contact_force" && summary.impacts > 0 && summary[name] === 0
+    ? null
+    : (summary[name] ?? null);

@@ -12,7 +12,7 @@ import {
   timeOfEnergy,
   differenceOf,
 } from "../result/series.js";
-import { capital, number, quantity, readable, title, words } from "../units.js";
+import { capital, metricOf, number, quantity, readable, title, words } from "../units.js";
 import { bandDifferences, bandSeries, bandText, furthestBand } from "./bands.js";
 import { ComparisonTable, FirstImpacts, Pushes } from "./comparison_table.js";
 import { isSame } from "./names.js";
@@ -291,7 +291,7 @@ function metricRows(runs) {
     .map((name) => ({
       name,
       unit: units[name],
-      values: runs.map(({ result }) => result.summary[name] ?? null),
+      values: runs.map(({ result }) => metricOf(result.summary, name)),
     }));
 }
 

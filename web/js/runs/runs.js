@@ -8,7 +8,7 @@ import { pageOf } from "../ui/page.js";
 import { html, useEffect, useReducer, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
-import { moment, title } from "../units.js";
+import { metricOf, moment, title } from "../units.js";
 import { Actions, isOpen, StateBadge, STATES } from "./actions.js";
 import { namesOf, varyingInputs } from "./names.js";
 import { valueText } from "./scene_name.js";
@@ -101,7 +101,7 @@ function columnsOf(rows, shown, schema, onCancel) {
       const numeric = { unit: unit ?? "1", digits: 4, value: of };
       return { key: pointer, label: title(label), ...(isNumeric ? numeric : { value: plain }) };
     });
-  const valueOf = (row, key) => row.summary?.[key] ?? null;
+  const valueOf = (row, key) => (row.summary ? metricOf(row.summary, key) : null);
   const metrics = METRICS.filter(({ key }) => shown.some((row) => valueOf(row, key) !== null)).map(
     (metric) => ({ ...metric, value: (row) => valueOf(row, metric.key) }),
   );

@@ -2,7 +2,7 @@
 // masses between their stops.
 import { html } from "../ui/preact.js";
 import { quantity } from "../units.js";
-import { layoutOf, roundDown } from "./layout.js";
+import { roundDown } from "./layout.js";
 import { limit } from "./model.js";
 import {
   Ball,

@@ -7,7 +7,7 @@ import { share } from "../result/headlines.js";
 import { bandLine } from "../runs/bands.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
-import { capital, number, quantity, title, words } from "../units.js";
+import { capital, metricOf, number, quantity, title, words } from "../units.js";
 import { Bars, Decision, sentence } from "./parts.js";
 
 const MOST_NAMED = 3; // in a sentence
@@ -178,7 +178,7 @@ function Numbers({ entries, units }) {
     ...metrics.map((key) => ({
       label: title(key),
       unit: units[key] ?? "1",
-      value: ({ summary }) => summary[key],
+      value: ({ summary }) => metricOf(summary, key),
     })),
     { label: "Mean contact", unit: "s", value: ({ contacts }) => contacts.mean_duration },
     {
