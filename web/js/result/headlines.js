@@ -42,7 +42,7 @@ function accuracy({ error_estimate: error, trust_horizon: horizon }) {
   return {
     label: "Accuracy",
     value: error === 0 ? "exact" : share(error, 2),
-    note: "of the largest displacement",
+    note: error > 0 && "of the largest displacement",
     help,
   };
 }

@@ -70,14 +70,15 @@ function chartsOf(result) {
   return charts;
 }
 
-// Impulses have no force over time.
-const usual = (charts, { plan }) =>
+// Impulses have no force over time, and press no buffer.
+const isImpulse = ({ plan }) => plan.contact_model === "impulse";
+const usual = (charts, result) =>
   charts
     .filter(
       ({ key }) =>
         key === "displacement" ||
         /^relative_[12]$/.test(key) ||
-        (key === "contact_force" && plan.contact_model !== "impulse"),
+        (key === "contact_force" && !isImpulse(result)),
     )
     .map(({ key }) => key);
 
@@ -87,6 +88,18 @@ function walls({ clearance, offset }) {
     { y: offset - clearance / 2, label: "left stop", color: "wall" },
     { y: offset + clearance / 2, label: "right stop", color: "wall" },
   ];
+}
+
+// Peaks of contacts that are too short for the samples to show them.
+const SHORT = 5; // sample intervals
+function unseenPeaks({ key, channels }, { sample_rate: rate }, impacts) {
+  const short = impacts.filter(
+    ({ start, end, peak_force: force }) => force > 0 && (end - start) * rate < SHORT,
+  );
+  if (key !== "contact_force" || channels.length > 1 || short.length === 0) return [];
+  const y = short.map(({ side, peak_force: force }) => (side === "right" ? force : -force));
+  const x = short.map(({ start, end }) => (start + end) / 2);
+  return [{ kind: "points", label: "peaks between samples", color: "force", x, y }];
 }
 
 // What lies behind the stops, shaded: the free mass is there while it presses a buffer.
@@ -234,7 +247,10 @@ export function Motion({ onDrawn }) {
           x=${{ label: "Time", unit: "s", domain: [0, window.end] }}
           y=${{ label: chart.title, unit: chart.unit }}
           height=${heights[Math.min(at, heights.length - 1)]}
-          series=${seriesFor(chart, loaded.data, bare.data)}
+          series=${[
+            ...seriesFor(chart, loaded.data, bare.data),
+            ...unseenPeaks(chart, result, isCut ? [] : (impacts.data?.impacts ?? [])),
+          ]}
           range=${range}
           onRange=${setRange}
           group="time"
@@ -242,7 +258,7 @@ export function Motion({ onDrawn }) {
           spans=${at === 0 ? spans : unlabelled}
           rules=${[...rules, ...(chart.damper ? walls(chart.damper) : [])]}
           markers=${at === 0 ? markers : []}
-          underlay=${chart.damper && buffers(chart.damper)}
+          underlay=${chart.damper && !isImpulse(result) ? buffers(chart.damper) : null}
         />`;
       })
     }
