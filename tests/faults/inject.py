@@ -40,8 +40,12 @@ def send(daemon, request):
 
 def is_temporary(job):
     """Whether a job failed of what may be better the next time."""
-    problem = job.get("problem") or job.get("error") or {}
-    return job["status"] == "failed" and problem.get("status") in (500, 503, 507)
+    problem = job.get("problem")
+    return job["status"] == "failed" and (problem is None or problem["status"] in (500, 503, 507))
+
+
+def has_failed(request, reply):
+    return request[1] == "/v1/jobs" and reply.status == 200 and is_temporary(reply.json())
 
 
 class Campaign:
@@ -129,10 +133,10 @@ class Campaign:
                     self.fault(f"{where}: {job}")
             elif is_done and "location" in reply.headers:
                 self.acknowledged[reply.headers["location"]] = None
-            # A run that others asked for meanwhile may still be failing.
+            # A run that is failing of the fault, and whose end is not stored yet, may fail this one too.
             again = send(daemon, request)
             for _ in range(3):
-                if again is None or again.status in (503, 507):
+                if again is None or again.status in (503, 507) or has_failed(request, again):
                     again = send(daemon, request)
         except (TimeoutError, OSError, KeyError) as reason:
             self.outcomes["hung"] += 1
@@ -141,7 +145,9 @@ class Campaign:
         # What was done, or may have been done, is there and cannot be done again.
         allowed = set(right)
         if reply is None or is_done:
-            allowed |= {409, 404, 412} if request[0] in ("POST", "DELETE") else set()
+            allowed |= {200, 404, 409, 412} if request[0] in ("POST", "DELETE") else set()
+        # A cancel that could not be stored holds until the end, and is tried again; a record that is there is found.
+        allowed |= {409} if request[0] == "DELETE" else {200} if request[1] == "/v1/records" else set()
         if again is None or again.status not in allowed:
             self.fault(f"{where}: answered {reply}, then {again}")
         elif is_done and request[0] == "GET" and again.status == reply.status and again.body != reply.body and not VARYING.intersection(request[1].split("/")):
