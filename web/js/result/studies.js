@@ -33,7 +33,7 @@ const STUDIES = [
   },
   {
     name: "sensitivity",
-    label: "What errors of the buffers do",
+    label: "What each input changes",
     isFor: ({ dampers }) => dampers.length > 0,
     text: () => "How the response changes with e, the contact time and the masses",
     make: () => ({ kind: "sensitivity" }),

@@ -54,7 +54,7 @@ function partingText([first, ...others], pairs) {
     return `${run.label} from ${quantity(divergence.time, "s")} on${rounding}`;
   });
   return parts.length > 0
-    ? `Apart from ${first.label} by 1 % of the largest displacement: ${parts.join(", ")}.`
+    ? `More than 1 % of the largest displacement apart from ${first.label}: ${parts.join(", ")}.`
     : null;
 }
 

@@ -40,7 +40,7 @@ export function ComparisonTable({ caption, head, runs, rows, isDiffering = false
       cell: (row) => row.heading,
     },
     ...runs.map(({ label, color }, at) => ({
-      label,
+      label: label.split(" ")[0], // the letter; names stand above
       isNumeric: true,
       color,
       value: (row) => row.values[at],

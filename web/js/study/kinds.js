@@ -5,7 +5,7 @@ export const KINDS = {
     load: async () => (await import("./compare.js")).CompareStudy,
   },
   sensitivity: {
-    title: "What errors of the buffers do",
+    title: "What each input changes",
     load: async () => (await import("./sensitivity.js")).SensitivityStudy,
   },
   tradeoff: {

@@ -124,13 +124,18 @@ function Spectrum({ spectrum: { channel, unit, value, median, q05, q95 }, freque
   />`;
 }
 
+// A deviation of 0 was not stated.
+function withDeviation(stop, name, unit) {
+  const deviation = stop[`${name}_deviation`];
+  return `${quantity(stop[name], unit)}${deviation > 0 ? ` ± ${share(deviation)}` : ""}`;
+}
+
 function Contacts({ contacts }) {
   const part = (label, name, unit) => ({
     label,
     isNumeric: true,
     value: (stop) => stop[name],
-    cell: (stop) =>
-      stop.why ?? `${quantity(stop[name], unit)} ± ${share(stop[`${name}_deviation`] ?? 0)}`,
+    cell: (stop) => stop.why ?? withDeviation(stop, name, unit),
   });
   const columns = [
     { label: "Stop", value: ({ damper, side }) => `damper ${damper}, ${side}` },
