@@ -364,6 +364,7 @@ static Status compare_show(App *app, char results[2][72], Outcome *outcomes[COMP
     if (status == STATUS_OK)
         status =
             json_diff(rows[0].scene, rows[1].scene, "study", &format, &inputs, &count, problem);
+    bytes.is_failed = inputs.is_failed && !inputs.is_over;
     if (status == STATUS_OK)
         compare_put(&bytes, rows, &inputs, count, outcomes, gone);
     for (int i = 0; i < 2; i++)

@@ -195,7 +195,8 @@ static Status search_read(const Request *request, MaterialSearch *search, Proble
     return request_count(request, "limit", 1, LIST_MAX, LIST_INITIAL, &search->limit, problem);
 }
 
-static bool search_has_words(const MaterialRevision *revision, const char *words) {
+// Without memory for a search the answer `bytes` fails.
+static bool search_has_words(const MaterialRevision *revision, const char *words, Bytes *bytes) {
     const Material *material = &revision->material;
     const char *const texts[] = {revision->slug,     material->name,   material->kind,
                                  material->supplier, material->source, material->notes};
@@ -206,15 +207,17 @@ static bool search_has_words(const MaterialRevision *revision, const char *words
             bytes_folded(&lines, text);
         bytes_text(&lines, "\n");
     }
+    bytes->is_failed = bytes->is_failed || lines.is_failed;
     const bool is_found = lines.at != NULL && strstr(lines.at, words) != NULL;
     bytes_clear(&lines);
     return is_found;
 }
 
-static bool search_has_kind(const Material *material, const char *kind) {
+static bool search_has_kind(const Material *material, const char *kind, Bytes *bytes) {
     Bytes own = {0};
     if (material->kind != NULL)
         bytes_folded(&own, material->kind);
+    bytes->is_failed = bytes->is_failed || own.is_failed;
     const bool is_same = own.at != NULL && strcmp(own.at, kind) == 0;
     bytes_clear(&own);
     return is_same;
@@ -231,13 +234,14 @@ static bool search_in_ranges(const MaterialSearch *search, const Material *mater
            search_range_has(contact_time, material->contact_time);
 }
 
-static bool search_matches(const MaterialSearch *search, const MaterialRevision *revision) {
+static bool search_matches(const MaterialSearch *search, const MaterialRevision *revision,
+                           Bytes *bytes) {
     const Material *material = &revision->material;
     return (search->status == CHOICE_ABSENT ||
             strcmp(revision->status, search_statuses[search->status]) == 0) &&
-           (search->kind.at == NULL || search_has_kind(material, search->kind.at)) &&
+           (search->kind.at == NULL || search_has_kind(material, search->kind.at, bytes)) &&
            search_in_ranges(search, material) &&
-           (search->words.at == NULL || search_has_words(revision, search->words.at));
+           (search->words.at == NULL || search_has_words(revision, search->words.at, bytes));
 }
 
 // Writes at most search->limit heads; *is_more: there is another after `last`.
@@ -252,7 +256,7 @@ static Status search_run(Db *db, const MaterialSearch *search, Bytes *bytes,
         TRY(db_material_heads(db, after, HEADS_READ, &heads, problem));
         for (size_t i = 0; i < heads.count && !*is_more; i++) {
             const MaterialRevision *head = &heads.at[i];
-            if (!search_matches(search, head))
+            if (!search_matches(search, head, bytes))
                 continue;
             if ((*is_more = count == search->limit))
                 break;

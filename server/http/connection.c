@@ -128,9 +128,14 @@ static struct MHD_Response *response_of_stream(Exchange *exchange, const Reply *
     return response;
 }
 
-static void response_add(struct MHD_Response *response, const char *name, const char *value) {
-    if (value != NULL && value[0] != '\0')
-        MHD_add_response_header(response, name, value);
+// Without memory for a header there is no response: a body without its encoding or its policy is
+// another one.
+static void response_add(struct MHD_Response **response, const char *name, const char *value) {
+    if (*response == NULL || value == NULL || value[0] == '\0' ||
+        MHD_add_response_header(*response, name, value) == MHD_YES)
+        return;
+    MHD_destroy_response(*response);
+    *response = NULL;
 }
 
 static const char *response_vary(const Reply *reply, bool has_origins, char text[48]) {
@@ -145,7 +150,7 @@ static const char *response_vary(const Reply *reply, bool has_origins, char text
 }
 
 // All headers but those of one request alone.
-static void response_add_all(struct MHD_Response *response, const Reply *reply,
+static void response_add_all(struct MHD_Response **response, const Reply *reply,
                              const ServerSettings *settings) {
     char varies[48];
     const bool is_events =
@@ -181,7 +186,7 @@ static void response_add_all(struct MHD_Response *response, const Reply *reply,
 }
 
 // `methods`: the answer to a preflight; else NULL.
-static void response_add_cors(struct MHD_Response *response, const char *origin,
+static void response_add_cors(struct MHD_Response **response, const char *origin,
                               const char *methods) {
     if (origin == NULL)
         return;
@@ -210,7 +215,7 @@ static struct MHD_Response *response_new(Exchange *exchange, Reply *reply) {
     if (response == NULL)
         reply_clear(reply);
     else
-        response_add_all(response, reply, &exchange->server->settings);
+        response_add_all(&response, reply, &exchange->server->settings);
     return response;
 }
 
@@ -220,12 +225,11 @@ static enum MHD_Result response_queue(Exchange *exchange, Reply *reply, bool clo
     const int code = reply->code;
     closes = closes || timer_list_is_closing(exchange->loop->timers);
     struct MHD_Response *response = response_new(exchange, reply);
+    response_add(&response, "X-Request-Id", request->id);
+    response_add_cors(&response, request->allow_origin, reply->is_preflight ? reply->allow : NULL);
+    response_add(&response, MHD_HTTP_HEADER_CONNECTION, closes ? "close" : NULL);
     if (response == NULL)
         return MHD_NO;
-    response_add(response, "X-Request-Id", request->id);
-    response_add_cors(response, request->allow_origin, reply->is_preflight ? reply->allow : NULL);
-    if (closes)
-        response_add(response, MHD_HTTP_HEADER_CONNECTION, "close");
     const enum MHD_Result result =
         MHD_queue_response(exchange->connection, (unsigned)code, response);
     MHD_destroy_response(response);

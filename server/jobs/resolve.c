@@ -814,9 +814,12 @@ Status jobs_prepare_stored(Db *db, const char *scene, const char *result, StudyR
                            bool *is_same, Problem *problem) {
     Warnings warnings = {NULL, 0};
     char id[72] = "";
-    const Status status = jobs_prepare(db, scene, strlen(scene), NULL, request, &warnings, problem);
-    if (status == STATUS_OK)
+    Status status = jobs_prepare(db, scene, strlen(scene), NULL, request, &warnings, problem);
+    if (status == STATUS_OK) {
         jobs_result_id(request, id);
+        if (id[0] == '\0')
+            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a digest");
+    }
     *is_same = strcmp(id, result) == 0;
     warnings_clear(&warnings);
     return status;
@@ -836,6 +839,8 @@ Status jobs_dry_run(JobManager *manager, const char *text, size_t size, DryRun *
     TRY(jobs_prepare_request(manager, text, size, &manager->settings.limits, request,
                              &dry_run->warnings, problem));
     jobs_result_id(request, dry_run->result);
+    if (dry_run->result[0] == '\0')
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a digest");
     TRY(request_enter_place(manager, request, &has_place, problem));
     const Status status = simulation_plan(&request->simulation, &dry_run->plan, problem);
     request_leave_place(manager, has_place);

@@ -74,7 +74,8 @@ static bool diff_put_value(Diff *diff, const char *name, const json_t *value) {
         bytes_put(diff->bytes, text.at, text.count);
     else if (diff->format->is_full)
         bytes_text(diff->bytes, "null");
-    const bool is_long = text.is_failed;
+    const bool is_long = text.is_over;
+    diff->bytes->is_failed = diff->bytes->is_failed || (text.is_failed && !is_long);
     bytes_clear(&text);
     return is_long;
 }

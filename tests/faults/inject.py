@@ -6,6 +6,7 @@
 The suite runs a few of them (tests/contract/test_faults.py)."""
 import argparse
 import collections
+import gzip
 import http.client
 import os
 import sys
@@ -42,6 +43,11 @@ def is_temporary(job):
     """Whether a job failed of what may be better the next time."""
     problem = job.get("problem")
     return job["status"] == "failed" and (problem is None or problem["status"] in (500, 503, 507))
+
+
+def decoded(reply):
+    """Without memory to pack it an answer is sent as it is."""
+    return gzip.decompress(reply.body) if reply.headers.get("content-encoding") == "gzip" else reply.body
 
 
 def has_failed(request, reply):
@@ -114,6 +120,8 @@ class Campaign:
         """The answer, and that of the same request without a fault."""
         if reply is None:
             self.outcomes["closed"] += 1
+        elif "content-security-policy" not in reply.headers and "x-content-type-options" not in reply.headers:
+            self.fault(f"{where}: headers are missing: {sorted(reply.headers)}")
         elif reply.status in right:
             self.outcomes["right"] += 1
         elif reply.status == 202 and request[1] == "/v1/jobs":
@@ -150,7 +158,7 @@ class Campaign:
         allowed |= {409} if request[0] == "DELETE" else {200} if request[1] == "/v1/records" else set()
         if again is None or again.status not in allowed:
             self.fault(f"{where}: answered {reply}, then {again}")
-        elif is_done and request[0] == "GET" and again.status == reply.status and again.body != reply.body and not VARYING.intersection(request[1].split("/")):
+        elif is_done and request[0] == "GET" and again.status == reply.status and decoded(again) != decoded(reply) and not VARYING.intersection(request[1].split("/")):
             self.fault(f"{where}: another answer than the next one")
         elif request[1] == "/v1/jobs" and again.status == 200 and again.json()["status"] != "successful":
             self.fault(f"{where}: the job again: {again}")
