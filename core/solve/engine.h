@@ -211,6 +211,7 @@ typedef struct SustainedContact {
     double ground[SUSTAINED_LEVELS][2], fall[SUSTAINED_LEVELS][2]; // as those of Flight
     double *start, *gained, *pulled, *elastic;                     // scratch
     double *block;
+    bool lacks_memory; // for the tables of a stop
 } SustainedContact;
 
 // Freed by sustained_contact_clear, also after a failure.

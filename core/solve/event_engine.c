@@ -198,6 +198,8 @@ static Status event_engine_advance(EventEngine *engine, double length) {
         return event_engine_step_power(engine, &slice, fmin(length, knot));
     if (event_engine_step_sustained(engine, &slice, fmin(length, knot)))
         return event_engine_count_steps(engine, event_engine_cost(engine, STEP_WORK_SUSTAINED));
+    if (engine->sustained.lacks_memory) // other steps would round differently
+        return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for a run");
     const bool is_suppressed = event_engine_is_suppressed(state);
     const double max = fmin(fmin(length, knot), is_suppressed ? state->suppress_time : INFINITY);
     taylor_step_make(arc, state, &slice, fmin(max, event_engine_arc_max(engine, &slice)));

@@ -27,6 +27,7 @@ typedef struct Companion {
     Response response;
     bool is_finished;      // parted or failed
     bool is_known;         // has not failed
+    bool lacks_memory;     // has failed of that
     bool is_stepped;       // contacts have a tolerance, and this run a finer one
     double largest, worst; // displacement, and difference of displacements, so far [m]
     double horizon;        // [s]; NAN: not reached
@@ -101,6 +102,11 @@ static void exact_companion_compare(Companion *companion, const ModalState *stat
     companion->is_finished = error > (companion->is_stepped ? 1 : PARTED) * companion->largest;
 }
 
+static void exact_companion_take(Companion *companion, Status status) {
+    companion->is_known = status == STATUS_OK;
+    companion->lacks_memory = status == STATUS_NO_MEMORY;
+}
+
 // Follows the run to its present sample; the steps count as the run's. False: it has failed just
 // now, perhaps by the run's own limit.
 static bool exact_companion_step(Companion *companion, const ModalState *state) {
@@ -111,7 +117,7 @@ static bool exact_companion_step(Companion *companion, const ModalState *state) 
     const size_t from = own->sample;
     exact_companion_nudge(own);
     while (own->sample < state->sample && companion->is_known)
-        companion->is_known = event_engine_step(&companion->engine, state->sample) == STATUS_OK;
+        exact_companion_take(companion, event_engine_step(&companion->engine, state->sample));
     state->run->work.neighbour_samples += own->sample - from;
     state->run->steps = companion->run.steps;
     if (companion->is_known)
@@ -121,7 +127,8 @@ static bool exact_companion_step(Companion *companion, const ModalState *state) 
     return companion->is_known;
 }
 
-// Starts beside an engine that has settled. A failure only leaves the run without an estimate.
+// Starts beside an engine that has settled. A failure only leaves the run without an estimate,
+// unless memory ran out: the same scene would have one at another time.
 static void exact_companion_start(Companion *companion, EventEngine *engine) {
     const ModalState *state = &engine->state;
     memset(companion, 0, sizeof *companion);
@@ -139,11 +146,13 @@ static void exact_companion_start(Companion *companion, EventEngine *engine) {
         state->plan->form == CONTACT_POWER && engine->power.tolerance > POWER_CONTACT_TOLERANCE;
     const size_t tracked = companion->is_stepped ? COMPANION_SAMPLES * state->padded : 0;
     companion->tracks = calloc(2 * tracked + 1, sizeof *companion->tracks);
-    companion->is_known =
-        companion->tracks != NULL &&
-        event_engine_shadow(&companion->engine, engine, &companion->run,
-                            fmax(engine->power.tolerance / FINER, POWER_CONTACT_TOLERANCE),
-                            &companion->response) == STATUS_OK;
+    exact_companion_take(
+        companion,
+        companion->tracks == NULL
+            ? STATUS_NO_MEMORY
+            : event_engine_shadow(&companion->engine, engine, &companion->run,
+                                  fmax(engine->power.tolerance / FINER, POWER_CONTACT_TOLERANCE),
+                                  &companion->response));
     if (!companion->is_known)
         return;
     if (companion->is_stepped) {
@@ -154,7 +163,7 @@ static void exact_companion_start(Companion *companion, EventEngine *engine) {
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
             (own->damper[d].r > 0 ? -1 : 1) * NUDGE * own->damper[d].plan->clearance;
-    companion->is_known = event_engine_settle(&companion->engine) == STATUS_OK;
+    exact_companion_take(companion, event_engine_settle(&companion->engine));
     companion->is_finished = !companion->is_known;
 }
 
@@ -188,7 +197,7 @@ static Status exact_solve(EventEngine *engine, Companion *companion) {
     TRY(event_engine_settle(engine));
     recorder_sample(&engine->record, state);
     exact_companion_start(companion, engine);
-    while (state->sample + 1 < plan->count) {
+    while (state->sample + 1 < plan->count && !companion->lacks_memory) {
         const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
         while (state->sample < until)
@@ -196,6 +205,8 @@ static Status exact_solve(EventEngine *engine, Companion *companion) {
         if (!exact_companion_step(companion, state))
             TRY(event_engine_check(engine)); // the cause may be the run's own limit
     }
+    if (companion->lacks_memory)
+        return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for a run");
     exact_companion_report(companion, state, state->impacts.response);
     // The duration may end between samples.
     TRY(event_engine_cross(engine, plan->duration - (double)state->sample / plan->sample_rate));

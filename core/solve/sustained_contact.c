@@ -96,8 +96,8 @@ static size_t sustained_contact_levels(const ModalState *state) {
 }
 
 // Makes the transitions of a stop once Taylor steps have cost about as much. False: there are none.
-static bool sustained_contact_prepare(SustainedStop *stop, const ModalState *state,
-                                      const DamperState *damper) {
+static bool sustained_contact_prepare(SustainedContact *sustained, SustainedStop *stop,
+                                      const ModalState *state, const DamperState *damper) {
     if (stop->levels[0].block != NULL)
         return true;
     const double n = (double)state->mode_count, arcs = state->interval * modal_state_rate(state);
@@ -107,8 +107,12 @@ static bool sustained_contact_prepare(SustainedStop *stop, const ModalState *sta
     if ((stop->spent += n) < 4 * n * n * n)
         return false;
     stop->damped = calloc(2 * state->mode_count, sizeof *stop->damped);
-    if (stop->damped == NULL || transition_make(stop->levels, sustained_contact_levels(state),
-                                                state, damper, NULL) != STATUS_OK) {
+    const Status status =
+        stop->damped == NULL
+            ? STATUS_NO_MEMORY
+            : transition_make(stop->levels, sustained_contact_levels(state), state, damper, NULL);
+    if (status != STATUS_OK) {
+        sustained->lacks_memory = status == STATUS_NO_MEMORY;
         sustained_contact_clear_stop(stop);
         *stop = (SustainedStop){.is_given_up = true};
         return false;
@@ -375,7 +379,7 @@ double sustained_contact_step(SustainedContact *sustained, ModalState *state, co
                            stops[0].parameters.damping == stops[1].parameters.damping;
     SustainedStop *stop =
         &sustained->stops[2 * (size_t)(alone - state->damper) + (are_alike ? 0 : alone->side)];
-    if (!sustained_contact_prepare(stop, state, alone))
+    if (!sustained_contact_prepare(sustained, stop, state, alone))
         return 0;
     modal_state_elastic(state, state->q, state->p, sustained->elastic);
     const SustainedStart from = {
