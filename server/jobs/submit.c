@@ -505,9 +505,11 @@ static Status retry_find(JobManager *manager, const char *id, SweepRow *row, Pro
                            "when it is",
                            id);
     Status status = db_result_find(manager->db, result, problem);
-    if (status == STATUS_NOT_FOUND)
+    if (status == STATUS_NOT_FOUND) {
+        problem_clear(problem);
         return problem_set(problem, STATUS_CONFLICT,
                            "the job %.40s has no result: submit its scene again", id);
+    }
     TRY(status);
     TRY(db_sweep_load(manager->db, result, row, problem));
     status = jobs_prepare_stored(manager->db, row->scene, row->result, &request, &is_same, problem);

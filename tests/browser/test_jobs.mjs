@@ -68,11 +68,11 @@ test("Runs without a title, or with the same one, are named by what differs; inp
   await page.getByRole("button", { name: "Motion, rms [mm]" }).click();
   await leads(page, /sort=rms_displacement/);
   const rising = (await cells(page, rms)).map(Number);
-  assert.deepEqual(rising, rising.toSorted((a, b) => a - b));
+  assert.deepEqual(rising, [...rising].sort((a, b) => a - b));
   await page.getByRole("button", { name: "Motion, rms [mm]" }).click();
   await leads(page, /sort=-rms_displacement/);
   await page.reload();
-  await until("the same order by the address", async () => (await cells(page, rms)).map(Number).join() === rising.toReversed().join());
+  await until("the same order by the address", async () => (await cells(page, rms)).map(Number).join() === [...rising].reverse().join());
 });
 
 test("Chosen runs are compared, renamed and deleted", async ({ page, daemon, url }) => {

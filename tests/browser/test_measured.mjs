@@ -76,7 +76,7 @@ test("A file is dropped on the page; one that is not right is refused with its l
       document.querySelector("main").dispatchEvent(new DragEvent(name, { dataTransfer: data, bubbles: true, cancelable: true }));
   }, text);
   const rows = (await motion(daemon, result)).map(([time, value]) => `${time.toFixed(3)},${value}`);
-  const wrong = (at, line) => rows.with(at, line).join("\n");
+  const wrong = (at, line) => [...rows.slice(0, at), line, ...rows.slice(at + 1)].join("\n");
   for (const [text, fault] of [[wrong(20, "0.177,abc"), /Line 21: "abc" is not a number; a time and a value would be right: 0\.005; 0\.0132/],
     [wrong(30, "5"), /Line 31 has 1 column, the lines before have 2/],
     [wrong(40, "9.9,0"), /Line 41: times rise by even steps, so 0\.217 would be right, not 9\.9/],

@@ -106,7 +106,9 @@ def test_what_another_engine_made_names_the_way_to_have_it_again():
             kept = [f"{part}.{form}" for part in ("psd", "impacts", "energy") for form in ("json", "csv", "npy", "npz", "mat")]
             before = {what: daemon.get(f"/v1/results/{made['result']}/{what}") for what in kept}
         with sqlite3.connect(os.path.join(folder, "impactd.db")) as database:
-            database.execute("UPDATE results SET engine = 'impactd-0', id = ? WHERE id = ?", (old, made["result"]))
+            # Without the checksums of id and engine, which stand at the end, as rows of earlier versions are.
+            database.execute("UPDATE results SET engine = 'impactd-0', id = ?, checks = substr(checks, 1, length(checks) - 8) WHERE id = ?",
+                             (old, made["result"]))
         database.close()
         with program.daemon(data=folder) as daemon:
             assert daemon.get(f"/v1/results/{old}").json()["summary"] == made["summary"]

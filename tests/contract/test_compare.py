@@ -233,7 +233,9 @@ def test_what_another_engine_made_is_compared_without_its_series():
         with program.daemon("--store-bytes", "0", data=folder) as daemon:
             one, two = (program.finished(daemon, scene(duration=duration)) for duration in (1, 2))
         with sqlite3.connect(os.path.join(folder, "impactd.db")) as database:
-            database.execute("UPDATE results SET engine = 'impactd-0' WHERE id = ?", (two["result"],))
+            # Without the checksums of id and engine, which stand at the end, as rows of earlier versions are.
+            database.execute("UPDATE results SET engine = 'impactd-0', checks = substr(checks, 1, length(checks) - 8) WHERE id = ?",
+                             (two["result"],))
         database.close()
         with program.daemon(data=folder) as daemon:
             reply = daemon.get(f"/v1/compare?a={one['result']}&b={two['result']}")
