@@ -259,7 +259,8 @@ def test_with_its_result_a_sweep_goes():
         assert daemon.request("DELETE", f"/v1/results/{job['result']}").status == 204
         assert daemon.get(f"/v1/results/{job['result']}/table.json").status == 404
         assert daemon.get(f"/v1/jobs/{job['id']}/table.json").status == 404
-        assert daemon.request("POST", f"/v1/jobs/{job['id']}/retry").status == 404
+        again = daemon.request("POST", f"/v1/jobs/{job['id']}/retry")
+        assert again.status == 409 and "submit its scene again" in again.json()["detail"], again
         base = sqlite3.connect(f"file:{daemon.data}/impactd.db?mode=ro", uri=True)
         assert base.execute("SELECT (SELECT count(*) FROM sweeps), (SELECT count(*) FROM sweep_chunks)").fetchone() == (0, 0)
         base.close()
