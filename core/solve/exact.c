@@ -26,8 +26,7 @@ typedef struct Companion {
     Run run;
     Response response;
     bool is_finished;      // parted or failed
-    bool is_known;         // has not failed
-    bool lacks_memory;     // has failed of that
+    Status status;         // of its engine
     bool is_stepped;       // contacts have a tolerance, and this run a finer one
     double largest, worst; // displacement, and difference of displacements, so far [m]
     double horizon;        // [s]; NAN: not reached
@@ -102,11 +101,6 @@ static void exact_companion_compare(Companion *companion, const ModalState *stat
     companion->is_finished = error > (companion->is_stepped ? 1 : PARTED) * companion->largest;
 }
 
-static void exact_companion_take(Companion *companion, Status status) {
-    companion->is_known = status == STATUS_OK;
-    companion->lacks_memory = status == STATUS_NO_MEMORY;
-}
-
 // Follows the run to its present sample; the steps count as the run's. False: it has failed just
 // now, perhaps by the run's own limit.
 static bool exact_companion_step(Companion *companion, const ModalState *state) {
@@ -116,15 +110,15 @@ static bool exact_companion_step(Companion *companion, const ModalState *state) 
     ModalState *own = &companion->engine.state;
     const size_t from = own->sample;
     exact_companion_nudge(own);
-    while (own->sample < state->sample && companion->is_known)
-        exact_companion_take(companion, event_engine_step(&companion->engine, state->sample));
+    while (own->sample < state->sample && companion->status == STATUS_OK)
+        companion->status = event_engine_step(&companion->engine, state->sample);
     state->run->work.neighbour_samples += own->sample - from;
     state->run->steps = companion->run.steps;
-    if (companion->is_known)
+    if (companion->status == STATUS_OK)
         exact_companion_compare(companion, state, from);
     else
         companion->is_finished = true;
-    return companion->is_known;
+    return companion->status == STATUS_OK;
 }
 
 // Starts beside an engine that has settled. A failure only leaves the run without an estimate,
@@ -133,7 +127,7 @@ static void exact_companion_start(Companion *companion, EventEngine *engine) {
     const ModalState *state = &engine->state;
     memset(companion, 0, sizeof *companion);
     companion->horizon = NAN;
-    companion->is_known = companion->is_finished = true;
+    companion->is_finished = true;
     if (!state->has_stops)
         return;
     companion->run = (Run){.plan = state->plan,
@@ -146,14 +140,13 @@ static void exact_companion_start(Companion *companion, EventEngine *engine) {
         state->plan->form == CONTACT_POWER && engine->power.tolerance > POWER_CONTACT_TOLERANCE;
     const size_t tracked = companion->is_stepped ? COMPANION_SAMPLES * state->padded : 0;
     companion->tracks = calloc(2 * tracked + 1, sizeof *companion->tracks);
-    exact_companion_take(
-        companion,
+    companion->status =
         companion->tracks == NULL
             ? STATUS_NO_MEMORY
             : event_engine_shadow(&companion->engine, engine, &companion->run,
                                   fmax(engine->power.tolerance / FINER, POWER_CONTACT_TOLERANCE),
-                                  &companion->response));
-    if (!companion->is_known)
+                                  &companion->response);
+    if (companion->status != STATUS_OK)
         return;
     if (companion->is_stepped) {
         engine->track = companion->tracks;
@@ -163,8 +156,8 @@ static void exact_companion_start(Companion *companion, EventEngine *engine) {
     for (size_t d = 0; d < own->dampers; d++)
         own->damper[d].r +=
             (own->damper[d].r > 0 ? -1 : 1) * NUDGE * own->damper[d].plan->clearance;
-    exact_companion_take(companion, event_engine_settle(&companion->engine));
-    companion->is_finished = !companion->is_known;
+    companion->status = event_engine_settle(&companion->engine);
+    companion->is_finished = companion->status != STATUS_OK;
 }
 
 // Error estimate and horizon.
@@ -177,7 +170,7 @@ static void exact_companion_report(const Companion *companion, const ModalState 
     const double drift = DBL_EPSILON * (1 + rate * state->plan->duration);
     const double worst = exact_companion_factor(companion) * companion->worst;
     const double error = size > 0 ? fmax(worst / size, drift) : 0;
-    response->has_trust = companion->is_known;
+    response->has_trust = companion->status == STATUS_OK;
     response->is_stepped = companion->is_stepped;
     response->error_estimate = error < (companion->is_stepped ? 1 : PARTED) ? error : 1;
     // A small error means that the horizon was found while the displacement was still small.
@@ -197,7 +190,7 @@ static Status exact_solve(EventEngine *engine, Companion *companion) {
     TRY(event_engine_settle(engine));
     recorder_sample(&engine->record, state);
     exact_companion_start(companion, engine);
-    while (state->sample + 1 < plan->count && !companion->lacks_memory) {
+    while (state->sample + 1 < plan->count && companion->status != STATUS_NO_MEMORY) {
         const size_t next = (state->sample / COMPANION_SAMPLES + 1) * COMPANION_SAMPLES;
         const size_t until = next < plan->count - 1 ? next : plan->count - 1;
         while (state->sample < until)
@@ -205,7 +198,7 @@ static Status exact_solve(EventEngine *engine, Companion *companion) {
         if (!exact_companion_step(companion, state))
             TRY(event_engine_check(engine)); // the cause may be the run's own limit
     }
-    if (companion->lacks_memory)
+    if (companion->status == STATUS_NO_MEMORY)
         return problem_set(state->problem, STATUS_NO_MEMORY, "no memory for a run");
     exact_companion_report(companion, state, state->impacts.response);
     // The duration may end between samples.

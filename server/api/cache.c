@@ -86,9 +86,7 @@ static Status cache_put_explained(App *app, const StudyRequest *inquiry, Bytes *
                                   Problem *problem) {
     char result[72];
     CacheLayers layers;
-    jobs_result_id(inquiry, result);
-    if (result[0] == '\0')
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a digest");
+    TRY(jobs_result_id(inquiry, result, problem));
     jobs_layers(app->manager, result, &layers);
     const bool is_cached = layers.in_memory || layers.in_database;
     bytes_json(bytes,

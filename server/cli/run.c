@@ -143,7 +143,8 @@ static Status job_write(const StudyRequest *request, const Warnings *warnings,
                     .summary = row.summary,
                     .work = row.work,
                     .notes = row.notes};
-    jobs_result_id(request, show.row.result);
+    if (status == STATUS_OK)
+        status = jobs_result_id(request, show.row.result, NULL);
     if (warned.is_failed)
         status = STATUS_NO_MEMORY;
     if (status == STATUS_OK)
@@ -177,7 +178,7 @@ static Status finding_write_page(const Finding *finding, Bytes *bytes, Problem *
     Report report = {.is_page = true};
     Bytes scene = {0};
     char result[72];
-    jobs_result_id(finding->request, result);
+    TRY(jobs_result_id(finding->request, result, problem));
     document_scene(&scene, finding->request);
     finding_report(finding, &report);
     if (!scene.is_failed)
@@ -499,7 +500,8 @@ static Status study_make(const char *path, const StudyRequest *request, const Wa
                                  0};
     char result[72];
     Bytes scene = {0};
-    jobs_result_id(request, result);
+    if (status == STATUS_OK)
+        status = jobs_result_id(request, result, problem);
     document_scene(&scene, request);
     if (status == STATUS_OK && scene.is_failed)
         status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the answer");

@@ -55,9 +55,9 @@ Status jobs_run_study(const Variant *study, const Simulation *simulation,
                       const SimulationLimits *limits, const Progress *watch, Variant **answer,
                       Problem *problem);
 
-// "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version; ""
-// without memory.
-void jobs_result_id(const StudyRequest *request, char target[72]);
+// "r-" and 64 hexadecimal digits: SHA-256 of the canonical form and the engine's version.
+// STATUS_NO_MEMORY: "".
+Status jobs_result_id(const StudyRequest *request, char target[72], Problem *problem);
 
 // Adds a line for each revision of a material, "sponge@1\n", unless has_materials is false, and
 // each record, "record:elcentro\n", that the prepared scene or its sweep names.

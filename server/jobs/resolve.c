@@ -798,16 +798,17 @@ Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,
                                              "--max-study-seconds of the server", problem);
 }
 
-void jobs_result_id(const StudyRequest *request, char target[72]) {
+Status jobs_result_id(const StudyRequest *request, char target[72], Problem *problem) {
     char hex[65];
     Sha256 *digest = sha256_new();
     target[0] = '\0';
     if (digest == NULL)
-        return;
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a digest");
     sha256_add(digest, engine_version, strlen(engine_version) + 1);
     canonical_write(study_request_fields, request, sha256_add, digest);
     sha256_end(digest, hex);
     snprintf(target, 72, "r-%s", hex);
+    return STATUS_OK;
 }
 
 Status jobs_prepare_stored(Db *db, const char *scene, const char *result, StudyRequest *request,
@@ -815,11 +816,8 @@ Status jobs_prepare_stored(Db *db, const char *scene, const char *result, StudyR
     Warnings warnings = {NULL, 0};
     char id[72] = "";
     Status status = jobs_prepare(db, scene, strlen(scene), NULL, request, &warnings, problem);
-    if (status == STATUS_OK) {
-        jobs_result_id(request, id);
-        if (id[0] == '\0')
-            status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a digest");
-    }
+    if (status == STATUS_OK)
+        status = jobs_result_id(request, id, problem);
     *is_same = strcmp(id, result) == 0;
     warnings_clear(&warnings);
     return status;
@@ -838,9 +836,7 @@ Status jobs_dry_run(JobManager *manager, const char *text, size_t size, DryRun *
     memset(dry_run, 0, sizeof *dry_run);
     TRY(jobs_prepare_request(manager, text, size, &manager->settings.limits, request,
                              &dry_run->warnings, problem));
-    jobs_result_id(request, dry_run->result);
-    if (dry_run->result[0] == '\0')
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a digest");
+    TRY(jobs_result_id(request, dry_run->result, problem));
     TRY(request_enter_place(manager, request, &has_place, problem));
     const Status status = simulation_plan(&request->simulation, &dry_run->plan, problem);
     request_leave_place(manager, has_place);

@@ -386,7 +386,6 @@ static Status submit_fill(const Entry *entry, const Warnings *warnings, Problem 
         return problem_set(problem, STATUS_INTERNAL, "no random numbers for a job's id");
     entry->job->indexed.key = row->id;
     row->created_unix_ms = clock_unix_ms();
-    jobs_result_id(request, row->result);
     document_scene(&scene, request);
     document_warnings(&warned, warnings);
     references_write(&uses, request, false);
@@ -402,7 +401,7 @@ static Status submit_fill(const Entry *entry, const Warnings *warnings, Problem 
         text_copy(entry->submission->client, &row->client),
         text_copy(has_key ? entry->key : NULL, &row->idempotency_key),
         text_copy(has_key ? entry->digest : NULL, &row->request),
-        status_made(row->result[0] != '\0')};
+        jobs_result_id(request, row->result, NULL)};
     return status_first(all, COUNT(all)) == STATUS_OK ? STATUS_OK : submit_no_memory(problem);
 }
 
@@ -567,8 +566,8 @@ static Status submit_resume(JobManager *manager, JobRow *row, StudyRequest *requ
                             Problem *problem) {
     Job *job = job_new(manager);
     QueueClient *client = queue_client(manager->queue, row->client != NULL ? row->client : "");
-    jobs_result_id(request, row->result);
-    Task *task = row->result[0] != '\0' ? submit_make_task(manager, row, request) : NULL;
+    const bool has_id = jobs_result_id(request, row->result, NULL) == STATUS_OK;
+    Task *task = has_id ? submit_make_task(manager, row, request) : NULL;
     if (job == NULL || client == NULL || task == NULL) {
         job_unref(job);
         task_free(task);

@@ -15,7 +15,7 @@ const AWAY = {
   detail: "Is it running? Nothing is lost here.",
 };
 
-// The reason of a failure: a module that could not be fetched means that nobody answered.
+// The reason of a failure: a module that could not be fetched means that the server did not answer.
 export const reason = (error) =>
   error instanceof TypeError && /module/i.test(error.message) ? new Refusal(0, AWAY) : error;
 

@@ -4,7 +4,7 @@ export function createStore(initial) {
   const listeners = new Set();
   return {
     get: () => value,
-    // set(next) or set((value) => next); readers are told where the value is another one.
+    // set(next) or set((value) => next); readers are called where the value is another one.
     set(next) {
       const changed = typeof next === "function" ? next(value) : next;
       if (Object.is(changed, value)) return;

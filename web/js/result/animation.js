@@ -8,7 +8,7 @@ import { channelsOf, makeFrames } from "../scene/frames.js";
 import { layoutOf } from "../scene/layout.js";
 import { limit, modelOf } from "../scene/model.js";
 import { settings } from "../settings.js";
-import { Failure, IconButton } from "../ui/controls.js";
+import { Failure, Figures, IconButton } from "../ui/controls.js";
 import { useStore } from "../ui/store.js";
 import { quantity } from "../units.js";
 import { channelNames, useResult, windowOf } from "./context.js";
@@ -337,13 +337,9 @@ function Readout({ time, state, model }) {
       if (state.forces[index] !== undefined) add(`Contact force${which}`, state.forces[index], "N");
     }
   }
-  return html`<dl class="figures readout" title="Free masses: from the middle between their stops">
-    ${rows.map(
-      ([label, value]) =>
-        html`<div>
-          <dt>${label}</dt>
-          <dd>${value}</dd>
-        </div>`,
-    )}
-  </dl>`;
+  return html`<${Figures}
+    pairs=${rows}
+    className="readout"
+    title="Free masses: from the middle between their stops"
+  />`;
 }

@@ -1,4 +1,4 @@
-// What a result has besides its numbers and its motion: loaded when these are drawn.
+// The rest of a result, beside its numbers and its motion: loaded when these are drawn.
 import { link } from "../address.js";
 import { Tabs } from "../ui/controls.js";
 import { html } from "../ui/preact.js";

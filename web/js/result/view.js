@@ -6,7 +6,7 @@ import { ResultHeadlines } from "./headlines.js";
 import { Motion } from "./motion.js";
 import { readable } from "../units.js";
 
-// `rest` is the module rest.js once it is loaded: nobody waits for it until onDrawn() says that the motion is there.
+// `rest` is the module rest.js once it is loaded: it is not waited for until onDrawn() says that the motion is there.
 export function ResultView({ result, signal, jobs, rest, onDrawn }) {
   const context = useResultContext(result, signal, jobs);
   return html`<${ResultContext.Provider} value=${context}>

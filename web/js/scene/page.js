@@ -1,7 +1,7 @@
 // A scene: described at the left, drawn and live at the right, run from here.
 import { schema as schemaNamed } from "../api.js";
 import { focusField } from "../form/form.js";
-import { Failure, Help, IconButton, Loaded, Panel, faultText } from "../ui/controls.js";
+import { Failure, Figures, Help, IconButton, Loaded, Panel, faultText } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
 import { useLoaded, useStore } from "../ui/store.js";
@@ -179,17 +179,6 @@ const Places = ({ kind, heading, list, onGo }) =>
       )}
     </ul>
   </div>`;
-
-const Figures = ({ pairs }) =>
-  html`<dl class="figures">
-    ${pairs.map(
-      ([label, value]) =>
-        html`<div>
-          <dt>${label}</dt>
-          <dd>${value}</dd>
-        </div>`,
-    )}
-  </dl>`;
 
 function Answer({ answer, onGo }) {
   const { plan, cost, warnings, cached, result } = answer;

@@ -2,6 +2,7 @@
 import { valueText } from "../runs/scene_name.js";
 import { html, useMemo } from "../ui/preact.js";
 import { submit } from "../api.js";
+import { Figures } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { quantity, title } from "../units.js";
 import { JobButton, SceneLink } from "./parts.js";
@@ -54,15 +55,7 @@ export function Point({ answer, model, chosen, best, sceneOf, pick, isDrawn }) {
           </label>`,
       )
     }
-    <dl class="figures">
-      ${figures.map(
-        ([label, value]) =>
-          html`<div>
-            <dt>${label}</dt>
-            <dd>${value}</dd>
-          </div>`,
-      )}
-    </dl>
+    <${Figures} pairs=${figures} />
     <div class="row">
       <${JobButton} label="Run this point" make=${async () => submit(await sceneOf(chosen)())} />
       <${SceneLink}

@@ -298,3 +298,15 @@ export const Headlines = ({ items }) =>
         </div>`,
     )}
   </dl>`;
+
+// Names with their values: [[name, value]]. Further options are attributes of the list.
+export const Figures = ({ pairs, className = "", ...attributes }) =>
+  html`<dl class=${`figures ${className}`} ...${attributes}>
+    ${pairs.map(
+      ([label, value]) =>
+        html`<div>
+          <dt>${label}</dt>
+          <dd>${value}</dd>
+        </div>`,
+    )}
+  </dl>`;

@@ -124,11 +124,11 @@ static void expect_member(const char *wanted) {
 static void expect_stable(void) {
     char id[72], again[72];
     char *text = canonical();
-    jobs_result_id(&inquiry, id);
+    jobs_result_id(&inquiry, id, NULL);
     if (resolve_text(text) != STATUS_OK)
         fail_msg("%s: %s: %s", text, problem.faults[0].pointer, problem.faults[0].detail);
     char *second = canonical();
-    jobs_result_id(&inquiry, again);
+    jobs_result_id(&inquiry, again, NULL);
     assert_string_equal(text, second);
     assert_string_equal(id, again);
     free(text);
@@ -248,7 +248,7 @@ TEST_IN(canonical_forms_of_named_revisions_never_change, set_up, tear_down) {
         resolve_well(cases[i].damper, cases[i].rest);
         expect_member(cases[i].form);
         forms[i] = canonical();
-        jobs_result_id(&inquiry, ids[i]);
+        jobs_result_id(&inquiry, ids[i], NULL);
     }
     for (int i = 0; i < 100; i++) {
         say("sponge", SAID("\"restitution\": 0.3, \"restitution_deviation\": 0.1, "
@@ -261,7 +261,7 @@ TEST_IN(canonical_forms_of_named_revisions_never_change, set_up, tear_down) {
         char id[72];
         assert_int_equal(resolve_text(forms[i]), STATUS_OK);
         char *again = canonical();
-        jobs_result_id(&inquiry, id);
+        jobs_result_id(&inquiry, id, NULL);
         assert_string_equal(again, forms[i]);
         assert_string_equal(id, ids[i]);
         free(again);

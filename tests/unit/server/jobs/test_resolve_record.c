@@ -72,12 +72,12 @@ TEST(scenes_share_the_samples_of_the_record_they_name) {
     Bytes scene = {0}, again = {0};
     Warnings warnings = {NULL, 0};
     document_scene(&scene, &one);
-    jobs_result_id(&one, ids[0]);
+    jobs_result_id(&one, ids[0], NULL);
     study_request_clear(&one);
     assert_int_equal(jobs_prepare(db, scene.at, scene.count, NULL, &two, &warnings, &problem),
                      STATUS_OK);
     document_scene(&again, &two);
-    jobs_result_id(&two, ids[1]);
+    jobs_result_id(&two, ids[1], NULL);
     assert_string_equal(scene.at, again.at);
     assert_string_equal(ids[0], ids[1]);
     assert_null(strstr(scene.at, "samples"));
@@ -219,8 +219,8 @@ TEST(faults_stand_where_the_name_or_the_digest_does) {
         {"\"name\": \"a\"", "[\"a\", \"record-2\"]", "", "/study/axes/0/values/1", "record-1"},
         {"\"name\": \"a\"", "[\"a\"]", ", \"records\": [{\"name\": \"a\", \"digest\": \"0\"}]",
          "/study/records/0/digest", ""},
-        {"\"name\": \"a\"", "[\"a\"]", ", \"records\": [{\"name\": \"x\"}]",
-         "/study/records/0", ""},
+        {"\"name\": \"a\"", "[\"a\"]", ", \"records\": [{\"name\": \"x\"}]", "/study/records/0",
+         ""},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         char study[512] = "";
