@@ -61,7 +61,7 @@ export async function until(what, probe, wait = WAIT_MS) {
 export async function says(locator, pattern, wait = WAIT_MS) {
   let text = "";
   await until(`${locator} to say ${pattern}`, async () => {
-    text = await locator.first().innerText();
+    text = (await locator.first().innerText()).replaceAll("\u00a0", " "); // between a number and its unit
     if (!pattern.test(text)) throw new Error(`it says ${JSON.stringify(text.slice(0, 400))}`);
     return true;
   }, wait);

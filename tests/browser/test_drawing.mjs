@@ -7,7 +7,7 @@ const drawing = (page) => page.getByRole("img", { name: /A (structure|frame)/ })
 // Lengths in the picture: pixels per metre by its bar, and the dimensions of the clearances from the top (px).
 const measured = (page) => drawing(page).evaluate((svg) => {
   const width = (node) => node.getBBox().width;
-  const [, number, prefix] = /([\d.]+) ([µm]?)m$/.exec(svg.querySelector(".bar-text").textContent);
+  const [, number, prefix] = /([\d.]+)\s([µm]?)m$/.exec(svg.querySelector(".bar-text").textContent);
   const release = svg.querySelector(".release .line");
   return {
     scale: width(svg.querySelector(".bar")) / (Number(number) * { "": 1, m: 1e-3, "µ": 1e-6 }[prefix]),
@@ -16,9 +16,9 @@ const measured = (page) => drawing(page).evaluate((svg) => {
   };
 });
 
-for (const [name, words] of [["paper_free_sponge", /1.35 kg.*0.1107 kg · sponge, clearance 15 mm/],
-  ["matrices", /25 kg.*clearance 20 mm/],
-  ["frame_two_dampers", /3 storeys.*storey 3 .*60 kg · sponge, clearance 40|storey 2 .*40 kg · soft rubber, clearance 30 mm/]])
+for (const [name, words] of [["paper_free_sponge", /1.35\skg.*0.1107\skg · sponge, clearance 15\smm/],
+  ["matrices", /25\skg.*clearance 20\smm/],
+  ["frame_two_dampers", /3 storeys.*storey 3 .*60\skg · sponge, clearance 40|storey 2 .*40\skg · soft rubber, clearance 30\smm/]])
   test(`The drawing of ${name} is to scale and named in words`, async ({ page, daemon, url }) => {
     const { dampers, excitation } = await daemon.example(name);
     await page.goto(url(`#/scene?example=${name}`));
@@ -37,7 +37,7 @@ test("A clearance is seen as it is typed; what cannot be read is left out", asyn
   await page.goto(url("#/scene"));
   const field = page.getByRole("textbox", { name: "Clearance" }).first();
   await field.fill("0.018");
-  await until("18 mm", async () => /clearance 18 mm/.test(await drawing(page).getAttribute("aria-label")));
+  await until("18 mm", async () => /clearance 18\smm/.test(await drawing(page).getAttribute("aria-label")));
   const { scale, clearances } = await measured(page);
   assert.ok(Math.abs(clearances[0] - 0.018 * scale) < 0.5);
   await field.fill("");

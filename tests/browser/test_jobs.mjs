@@ -52,7 +52,7 @@ test("Runs are found by words, state and study, by a URL too, and one is cancell
 });
 
 const cells = (page, at) => page.getByRole("row").evaluateAll((rows, column) =>
-  rows.slice(1).map((row) => row.cells[column].innerText.trim().split(/\n+/).join(": ")), at);
+  rows.slice(1).map((row) => row.cells[column].innerText.trim().replaceAll("\u00a0", " ").split(/\n+/).join(": ")), at);
 
 test("Runs without a title, or with the same one, are named by what differs; inputs and metrics are columns that sort", async ({ page, daemon, url }) => {
   const { title, ...scene } = await daemon.example("paper_free_sponge");

@@ -35,7 +35,7 @@ test("One preview is on its way at a time, and the newest scene wins", async ({ 
   await preview.asked();
   assert.equal(sent, 1);
   await preview.letGo();
-  await until("the mass", async () => Number(/Free mass\s+([\d.]+) kg/.exec(await live(page).innerText())?.[1]) > 0.12);
+  await until("the mass", async () => Number(/Free mass\s+([\d.]+)\skg/.exec(await live(page).innerText())?.[1]) > 0.12);
   await until("the newest", async () => sent === 2 && /rms −(?!30\.8)/.test(await live(page).innerText()));
 });
 
@@ -63,7 +63,7 @@ test("What is dragged in the drawing changes the scene, runs it, and is one step
   assert.ok(wider > 0.018 && wider < 0.04, `${wider} m`);
   await until("the field to follow", async () => Number(await clearance(page).inputValue()) === wider);
   await says(live(page), /rms −(?!30\.8)/);
-  assert.match(await handle(page, "Clearance").getAttribute("aria-valuetext"), / mm$/);
+  assert.match(await handle(page, "Clearance").getAttribute("aria-valuetext"), /\smm$/);
   await undo.click();
   await until("the clearance of before", async () => (await scene()).dampers[0].clearance === 0.015);
   assert.ok(await undo.isDisabled(), "one drag is one step");
@@ -87,7 +87,7 @@ test("The handles are moved by arrow keys; a shaken base has one too", async ({ 
   await until("another amplitude", async () => (await base.getAttribute("aria-valuetext")) !== before);
   await tabTo(page, handle(page, "Restitution"));
   await page.keyboard.press("ArrowUp");
-  await until("e", async () => /^e 0\.63, contact time 25 ms$/.test(await handle(page, "Restitution").getAttribute("aria-valuetext")));
+  await until("e", async () => /^e 0\.63, contact time 25\sms$/.test(await handle(page, "Restitution").getAttribute("aria-valuetext")));
 });
 
 test("A run that is too long for a preview says so; how long a frame of the live view takes", async ({ page, url }) => {

@@ -21,12 +21,12 @@ async function scene(page) {
 test("An edited clearance is drawn, derived from, kept in the URL and the same elsewhere", async ({ page, newPage, url }) => {
   await page.goto(url("#/scene"));
   await says(page.locator("main"), /1\.656 kN\/m[\s\S]*4\.046 N s\/m/);
-  await shows(page, /15 mm/);
+  await shows(page, /15\smm/);
   await clearance(page).fill("0,01");
-  await shows(page, /10 mm/);
+  await shows(page, /10\smm/);
   await leads(page, /#\/scene\?s=/);
   await clearance(page).fill("2e-2");
-  await shows(page, /20 mm/);
+  await shows(page, /20\smm/);
   await box(page, "Mass").nth(0).fill("2.7");
   await says(outcome(page), /2\.85 Hz/);
   const typed = JSON.stringify(await scene(page));

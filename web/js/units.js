@@ -62,7 +62,7 @@ export function quantity(value, unit, digits = 4) {
   if (isUnknown(value)) return "–";
   const [factor, scaled] = scale(Math.abs(value), unit),
     text = number(value / factor, digits);
-  return scaled && scaled !== "1" ? `${text} ${pretty(scaled)}` : text;
+  return scaled && scaled !== "1" ? `${text}\u00a0${pretty(scaled)}` : text;
 }
 
 // A text of the service with readable numbers: "step 1e-05 s" as "step 10 µs", "0.000101 m" as "101 µm".

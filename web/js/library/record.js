@@ -162,9 +162,14 @@ function Facts({ record }) {
 function Record({ record, query }) {
   const { name } = record;
   const path = pathOf(name);
+  const [isLeaving, setLeaving] = useState(false);
   const remove = async () => {
     if (!confirm(`Delete ${name} for good?`)) return;
-    await ask("DELETE", path);
+    setLeaving(true); // nothing is asked about it any more
+    await ask("DELETE", path).catch((problem) => {
+      setLeaving(false);
+      throw problem;
+    });
     go("records");
   };
   return html`<div class="title-row">
@@ -187,10 +192,13 @@ function Record({ record, query }) {
     <${Numbers} record=${record} />
     <div class="split">
       <div>
-        <section class="panel" aria-label="Samples">
-          <${Samples} record=${record} query=${query} />
-        </section>
-        <${Spectrum} name=${name} query=${query} />
+        ${
+          !isLeaving &&
+          html`<section class="panel" aria-label="Samples">
+              <${Samples} record=${record} query=${query} />
+            </section>
+            <${Spectrum} name=${name} query=${query} />`
+        }
       </div>
       <${Facts} record=${record} />
     </div>`;

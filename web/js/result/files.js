@@ -1,7 +1,7 @@
 // What a reader takes along: files in every format, and lines that run this scene elsewhere.
 import { html } from "../ui/preact.js";
 import { address, save } from "../api.js";
-import { CodeBlock } from "../ui/controls.js";
+import { CodeBlock, Figures } from "../ui/controls.js";
 import { title } from "../units.js";
 import { useResult } from "./context.js";
 
@@ -24,23 +24,16 @@ export function Files() {
     event.preventDefault();
     await save(file.path, `${id.slice(0, 10)}_${file.name}`);
   };
-  return html`<dl class="figures">
-      ${[...filesOf(links)].map(
-        ([part, files]) =>
-          html`<div>
-            <dt>${title(part)}</dt>
-            <dd>
-              ${files.map(
-                (file) =>
-                  html`<a href=${address(file.path)} aria-label=${file.name} onClick=${take(file)}
-                      >${file.format}</a
-                    >${" "}`,
-              )}
-            </dd>
-          </div>`,
-      )}
-    </dl>
-    ${Object.entries(languages(url, text)).map(
+  const pairs = [...filesOf(links)].map(([part, files]) => [
+    title(part),
+    files.map(
+      (file) =>
+        html`<a href=${address(file.path)} aria-label=${file.name} onClick=${take(file)}
+            >${file.format}</a
+          >${" "}`,
+    ),
+  ]);
+  return html`<${Figures} pairs=${pairs} /> ${Object.entries(languages(url, text)).map(
       ([name, lines]) =>
         html`<details>
           <summary>Run this scene from ${name}</summary>

@@ -1,7 +1,7 @@
 // How a result was computed: how exact it is, what was decided and why, what the buffers came to, the structure's modes.
 import { html } from "../ui/preact.js";
 import { link } from "../address.js";
-import { Help } from "../ui/controls.js";
+import { Figures, Help } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
@@ -71,19 +71,12 @@ export function Method() {
     { label: "Damping ratio", unit: "1", value: (row) => row.damping_ratio },
   ];
   const { error_estimate: error, trust_horizon: horizon } = summary;
+  const named = (name) => html`${name} <${Help} name=${name} />`;
   const accuracy = [
-    ["Error estimate", error === null ? "–" : share(error, 2)],
-    ["Trust horizon", horizon === null ? "the whole run" : quantity(horizon, "s")],
+    [named("Error estimate"), error === null ? "–" : share(error, 2)],
+    [named("Trust horizon"), horizon === null ? "the whole run" : quantity(horizon, "s")],
   ];
-  return html`<dl class="figures">
-      ${accuracy.map(
-        ([label, value]) =>
-          html`<div>
-            <dt>${label} <${Help} name=${label} /></dt>
-            <dd>${value}</dd>
-          </div>`,
-      )}
-    </dl>
+  return html`<${Figures} pairs=${accuracy} />
     <p>${accuracyText(summary)}</p>
     <p>${cost}</p>
     <dl class="decisions">

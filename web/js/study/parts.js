@@ -1,9 +1,10 @@
 // What the pages of studies share: the sentence that a study leads to, ways to scenes and runs, bars.
-import { html, useEffect, useState } from "../ui/preact.js";
+import { html } from "../ui/preact.js";
 import { go, link, pack } from "../address.js";
 import { Chart } from "../chart/chart.js";
 import { Button, Failure, withSubscripts } from "../ui/controls.js";
 import { labelOf } from "../runs/names.js";
+import { useLoaded } from "../ui/store.js";
 import { quantity, readable } from "../units.js";
 
 // The scene alone, without its study.
@@ -42,23 +43,12 @@ export const quantities = (label, value, unitOf, digits) => ({
 
 // A link to the form with the scene that load() brings: the address holds it.
 export function SceneLink({ label, load, keys = [], className }) {
-  const [state, setState] = useState({});
-  useEffect(() => {
-    let isGone = false;
-    const set = (next) => isGone || setState(next);
-    Promise.resolve()
-      .then(load)
-      .then(pack)
-      .then(
-        (s) => set({ href: link("scene", { s }) }),
-        (error) => set({ error }),
-      );
-    return () => {
-      isGone = true;
-    };
-  }, keys);
-  if (state.error) return html`<${Failure} error=${state.error} />`;
-  return html`<a class=${className} href=${state.href}>${label}</a>`;
+  const { data, error } = useLoaded(
+    async () => link("scene", { s: await pack(await load()) }),
+    keys,
+  );
+  if (error) return html`<${Failure} error=${error} />`;
+  return html`<a class=${className} href=${data}>${label}</a>`;
 }
 
 // A button that makes a job and goes to its result, or to the job while it runs.

@@ -4,9 +4,8 @@ import { html, useLayoutEffect, useRef, useState } from "./preact.js";
 import { link, read } from "../address.js";
 import { reason } from "../api.js";
 import { announce } from "./announce.js";
-import { capital } from "../units.js";
 import { freshId } from "./ids.js";
-import { pretty } from "../units.js";
+import { capital, pretty } from "../units.js";
 
 // A button that is not pressed again while what it did goes on; what fails is shown behind it.
 export function Button({ onClick, isPrimary, isQuiet, disabled, label, title, children }) {
