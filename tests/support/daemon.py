@@ -80,7 +80,7 @@ class Daemon:
         while time.monotonic() < end:
             line = self.process.stdout.readline()
             self.greeting += line
-            found = re.search(r"listens on (http://(.+):(\d+))", line)
+            found = re.search(r"listens on (https?://(.+):(\d+))", line)
             if found:
                 self.url, self.host, self.port = found[1], found[2], int(found[3])
                 return self
