@@ -165,9 +165,7 @@ static Status sweep_reply_chart(App *app, Reply *reply, const TableFormat *forma
     if (is_whole)
         return reply_bytes(reply, 200, format->content_type, &bytes, problem);
     bytes_clear(&bytes);
-    return problem_set(
-        problem, STATUS_BUSY,
-        "the table's rows were deleted or computed again while they were read; ask again");
+    return problem_set(problem, STATUS_BUSY, "%s", sweep_rows_changed);
 }
 
 Status sweeps_table(App *app, const Request *request, Reply *reply, Problem *problem) {

@@ -119,6 +119,9 @@ static void sweep_failed_add(const SweepRow *row, const SweepChunkRow *chunk, Sw
     }
 }
 
+const char sweep_rows_changed[] =
+    "the table's rows were deleted or computed again while they were read; ask again";
+
 static Status sweep_view_find_failures(SweepView *view, Problem *problem) {
     SweepFailed failed[SWEEP_STATUSES] = {{0}};
     SweepTable *table = &view->sweep->table;
@@ -165,6 +168,17 @@ static Status sweep_view_find(Db *db, const char *id, bool is_job, SweepRow *row
                : problem_set(problem, status, "the sweeps cannot be searched");
 }
 
+// Whether its sweep is that of its result still. Both may have been deleted, and made again.
+static bool sweep_view_is_current(const SweepView *view) {
+    const SweepRow *row = &view->row;
+    SweepRow now;
+    if (db_sweep_load(view->db, row->result, &now, NULL) != STATUS_OK)
+        return false;
+    const bool is_same = now.number == row->number && now.created_unix_ms == row->created_unix_ms;
+    sweep_row_clear(&now);
+    return is_same && db_result_exists(view->db, row->result);
+}
+
 Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, SweepView *view,
                        Problem *problem) {
     memset(view, 0, sizeof *view);
@@ -181,6 +195,8 @@ Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, S
     // In this order: a result is saved after its chunks.
     const bool is_finished = db_result_exists(db, view->row.result);
     TRY(db_sweep_chunks(db, view->row.number, &view->chunks, problem));
+    if (is_finished && view->chunks.count < view->row.chunks && !sweep_view_is_current(view))
+        return problem_set(problem, STATUS_BUSY, "%s", sweep_rows_changed);
     if (is_finished && view->chunks.count < view->row.chunks)
         return problem_set(problem, STATUS_INTERNAL,
                            "the database is damaged: %llu of %llu parts of the table of %.72s are "

@@ -35,7 +35,7 @@ typedef struct SweepView {
 } SweepView;
 
 // By its result, or (`is_job`) by a job that makes it or did. Cleared by sweep_view_clear in any
-// case.
+// case. STATUS_BUSY: its rows were deleted meanwhile.
 Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, SweepView *view,
                        Problem *problem);
 void sweep_view_clear(SweepView *view);
@@ -44,6 +44,8 @@ void sweep_view_clear(SweepView *view);
 // in the order of their points; `view` is a SweepView. Memory is one window, whatever their number.
 // False: the rows have changed since it was loaded, or cannot be read.
 bool sweep_view_read(void *view, size_t cell, size_t first, size_t count, double *target);
+
+extern const char sweep_rows_changed[]; // the sentence of STATUS_BUSY
 
 // One point of it.
 typedef struct SweepPoint {

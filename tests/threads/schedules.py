@@ -34,7 +34,8 @@ CLIENTS = 3
 PER_LIFE = 20  # schedules of one life of the daemon; it ends in the last of them
 PER_FOLDER = 10  # lives with the same data
 TIMEOUT = 120  # [s] until a daemon that does not end has hung
-OPTIONS = ("--workers", "2", "--cache-bytes", "65536", "--rate", "0", "--journal", "off")
+OPTIONS = ("--workers", "2", "--rate", "0", "--journal", "off")
+CACHES = ("8192", "65536")  # [B], both soon full
 FAULTS = [(control.ALLOCATIONS, 0), *control.KINDS.values()]
 
 
@@ -66,8 +67,8 @@ def certificate(folder):
 
 
 class Campaign:
-    def __init__(self, seed=1, is_free=False, has_faults=False):
-        self.seed, self.is_free, self.has_faults = seed, is_free, has_faults
+    def __init__(self, seed=1, is_free=False, has_faults=False, mix="all"):
+        self.mix, self.seed, self.is_free, self.has_faults = mix, seed, is_free, has_faults
         self.outcomes, self.answers = collections.Counter(), collections.Counter()
         self.wrong, self.orders, self.switches = [], set(), 0
         self.references = References(OPTIONS)
@@ -88,7 +89,7 @@ class Campaign:
 
     def folder(self, folder, done, schedules):
         """Some lives of daemons with the same data; afterwards what was acknowledged is in the database, once."""
-        self.jobs, self.revisions = {}, []
+        self.jobs, self.revisions, self.purged = {}, [], []
         # Every second folder is served with TLS, so that SIGHUP has something to read.
         tls = certificate(folder) if (done // PER_LIFE // PER_FOLDER) % 2 == 1 or schedules < PER_LIFE * PER_FOLDER else ()
         data = os.path.join(folder, "data")
@@ -107,6 +108,8 @@ class Campaign:
         for job in self.jobs:
             if ids[job] != 1:
                 self.fault("duplicated" if ids[job] else "lost", f"{job} is {ids[job]} times in the database")
+        if any(ids[job] for job in self.purged):
+            self.fault("wrong", "a job that was removed is there again")
         if len(set(self.revisions)) != len(self.revisions):
             self.fault("duplicated", f"revisions {self.revisions}")
         self.outcomes["jobs"] += len(self.jobs)
@@ -115,7 +118,7 @@ class Campaign:
     def life(self, data, tls, done, last):
         scheduler, faults = Scheduler(self.seed + done), control.Control(data)
         environment = faults.environment if self.has_faults else {} if self.is_free else scheduler.environment
-        daemon = program.Daemon(program.build, *OPTIONS, *tls, data=data, environment=environment)
+        daemon = program.Daemon(program.build, *OPTIONS, *tls, "--cache-bytes", CACHES[done // PER_LIFE % 2], data=data, environment=environment)
         try:
             daemon.start(60)
             self.actors = [Actor(self, daemon, index) for index in range(CLIENTS)]
@@ -140,7 +143,7 @@ class Campaign:
         if is_last:
             end = threading.Thread(target=self.end, args=(daemon, chance.random() * 0.1, chance.random() < 0.75))
             end.start()
-        scenes = self.references.draw(chance)
+        scenes = self.references.draw(chance) if self.mix == "all" else 3 * [self.references.scenes[-1]]
         with ThreadPoolExecutor(CLIENTS) as pool:
             ran = [pool.submit(actor.act, seed, scenes) for actor in self.actors]
         if self.has_faults:
@@ -154,10 +157,17 @@ class Campaign:
             self.fault("crashed", f"schedule {seed}: ended with {daemon.process.poll()}: {daemon.stderr()[-2000:]}")
             raise Ended
         if not is_last:
-            for job in [job for job in self.jobs.values() if not job.is_settled]:
-                self.settle(self.actors[0], job)
+            self.check(seed)
         self.orders.add(scheduler.fields.digest)
         self.switches += scheduler.fields.switches
+
+    def check(self, seed):
+        for job in [job for job in self.jobs.values() if not job.is_settled]:
+            self.settle(self.actors[0], job)
+        try:
+            self.actors[0].verify()
+        except Exception as reason:  # noqa: BLE001 - whatever it was, it is counted
+            self.fault("hung" if isinstance(reason, TimeoutError) else "wrong", f"after schedule {seed}: {reason!r}")
 
     def end(self, daemon, after, is_soft):
         """The daemon ends amid requests, with 0 if it was asked to."""
@@ -200,10 +210,11 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--free", action="store_true")
     parser.add_argument("--faults", action="store_true")
+    parser.add_argument("--mix", choices=["all", "tables"], default="all", help="of actions")
     arguments = parser.parse_args()
     program.build = os.path.abspath(arguments.build)
     begin = time.monotonic()
-    campaign = Campaign(arguments.seed, arguments.free, arguments.faults)
+    campaign = Campaign(arguments.seed, arguments.free, arguments.faults, arguments.mix)
     campaign.run(arguments.schedules)
     for (what, code), count in sorted(campaign.answers.items()):
         print(f"{what:10} {code}  {count}")

@@ -1,6 +1,8 @@
 // Sweeps in the jobs room, with the real engine and a real database: cancelled, interrupted and
 // resumed at any moment, beside other jobs.
 #include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <unistd.h>
 
 #include "server/jobs/jobs_private.h"
@@ -89,4 +91,54 @@ TEST(a_sweep_waits_for_a_disk_whose_faults_pass) {
         assert_whole(&room, result, 300);
         room_end(&room);
     }
+}
+
+typedef struct Reading {
+    Db *db;
+    char result[72];
+    atomic_bool is_over;
+    atomic_size_t loaded;
+    _Atomic Status wrong;
+} Reading;
+
+static void *read_tables(void *context) {
+    Reading *reading = context;
+    while (!atomic_load(&reading->is_over)) {
+        SweepView show;
+        Problem problem = {.status = STATUS_OK};
+        const Status status =
+            sweep_view_load(reading->db, reading->result, false, true, &show, &problem);
+        sweep_view_clear(&show);
+        atomic_fetch_add(&reading->loaded, status == STATUS_OK);
+        if (status != STATUS_OK && status != STATUS_NOT_FOUND && status != STATUS_BUSY) {
+            print_message("%s\n", problem.detail);
+            atomic_store(&reading->wrong, status);
+        }
+    }
+    return NULL;
+}
+
+// One that is deleted between two queries of a reader was no damage.
+TEST(a_table_that_is_deleted_while_it_is_read_is_busy_or_gone) {
+    enum { POINTS = 4, TIMES = 60, READERS = 2 };
+    Room room = room_make(2);
+    pthread_t threads[READERS];
+    char id[40];
+    Reading reading = {.db = room.db, .wrong = STATUS_OK};
+    submit(&room, POINTS, 0.1, id);
+    room_finish(&room, id, reading.result);
+    for (size_t i = 0; i < READERS; i++)
+        assert_int_equal(pthread_create(&threads[i], NULL, read_tables, &reading), 0);
+    for (size_t i = 0; i < TIMES; i++) {
+        char result[72];
+        assert_int_equal(jobs_delete(room.manager, reading.result, NULL), STATUS_OK);
+        submit(&room, POINTS, 0.1, id);
+        room_finish(&room, id, result);
+    }
+    atomic_store(&reading.is_over, true);
+    for (size_t i = 0; i < READERS; i++)
+        pthread_join(threads[i], NULL);
+    assert_int_equal(reading.wrong, STATUS_OK);
+    assert_true(reading.loaded > 0);
+    room_end(&room);
 }
