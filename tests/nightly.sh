@@ -5,12 +5,13 @@
 #
 #   commit      tests/run.sh
 #   clang       the program and its tests as clang compiles them, without a warning
-#   threads     the thread sanitizer: unit tests of jobs, db and http, requests and cancels
+#   threads     the thread sanitizer: unit tests of jobs, db and http, requests, cancels, SIGHUP, ends and faults; random
+#               schedules of the threads
 #   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
 #   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
 #   faults      every allocation and file call of the canonical requests fails in turn
 #   truth       the long campaigns of tests/truth
-#   storm       a million requests, 10,000 cancels
+#   storm       a million requests with killed clients and restarts, 10,000 cancels
 #   fuzz        mutated ground motions and material files
 #   browser     the browser tests with slow computers and late answers
 #   coverage    the lines and branches of server/ and core/ that unit and contract tests reach
@@ -100,6 +101,13 @@ part_threads() {
     ctests tsan ^unit/server/http "${still[@]}"
     marked build-tsan 'THREADED = True' "${still[@]}"
     sized 200 10000 "${still[@]}" "$python" tests/storm/cancel_storm.py --build build-tsan
+    # Jobs, cancels, deletions, SIGHUP, evictions and ends at once, then also failing allocations and file calls. 600 s
+    local how
+    for how in --free --faults; do sized '--schedules 20' '--schedules 1000' "${still[@]}" "$python" tests/threads/schedules.py --build build-tsan "$how"; done
+    # The same under random schedules: one thread runs at a time, by priorities that a seed decides. 1000 s
+    build release
+    sized '--schedules 40' '--schedules 10000' "$python" tests/threads/schedules.py --build build
+    sized '--schedules 40' '--schedules 2000' "$python" tests/threads/schedules.py --build build --mix tables
 }
 
 part_sanitized() {
@@ -162,8 +170,9 @@ part_truth() {
 
 part_storm() {
     build release
-    # Each request is answered as it should be; memory and descriptors are flat after warming up. 1200 s
-    sized '--requests 20000 --clients 4' '--requests 1000000 --clients 8' "$python" tests/storm/mixed.py --build build
+    # Each request is answered as it should be, nothing acknowledged is lost by ends of clients and of the daemon; memory and
+    # descriptors are flat within its lives and from one to the next. 1500 s
+    sized '--requests 20000 --clients 4 --restarts 2' '--requests 1000000 --clients 8' "$python" tests/storm/mixed.py --build build
     # CPU that goes on after a cancel was answered, median and most, by solver, excitation and study. 300 s
     sized 2 20 "$python" tests/storm/cancel_cpu.py --build build
 }
