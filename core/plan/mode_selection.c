@@ -29,14 +29,17 @@
 
 #include "core/math/matrix_exponential.h"
 
-enum { ROUNDINGS = 64 };
-static const double PROGRESS_STEPS = 4096; // between two looks at the progress
+enum {
+    ROUNDINGS = 64,
+    PROGRESS_STEPS = 4096, // between two looks at the progress
+};
 static const double NEGLIGIBLE = ROUNDINGS * DBL_EPSILON;
 
 static const double PI = 3.14159265358979323846;
 static const double SAFETY = 2;
-static const double STEPS_MAX = 2e7; // steps of modes: about 40 ms
-static const double RADIANS = 0.3;   // of the fastest motion in a step
+static const double STEPS_MAX = 2e7;                 // steps of modes: about 40 ms
+static const double RADIANS = 0.3;                   // of the fastest motion in a step
+static const double MODE_STEP = 0.07, BASE_STEP = 0.3; // cost of a step, in solver steps
 
 // All modes in motion. Arrays have a number for each mode.
 typedef struct ModalRun {
@@ -45,8 +48,9 @@ typedef struct ModalRun {
     const Plan *plan;
     const Base *base;
     size_t n;
-    double step;        // [s]
-    double *q, *p;      // the state
+    double step;                          // [s]
+    double piece_speeds[BASE_PIECES_MAX]; // the integrals of a_g over whole pieces [m/s]
+    double *q, *p;                        // the state
     double *recurrence; // eight rows: what (q, q', a_g, a_g') add to q and to q' in a step
     double *peak_q, *peak_p;
     // Sums of squares of q, q', q'' and q'' + share a_g; sum of the products with q of mode 0.
@@ -98,31 +102,37 @@ static void modal_run_step(ModalRun *run, double a, double b) {
     run->count++;
 }
 
-// The integral of a_g up to t, of a base in closed form [m/s].
-static double modal_run_base_speed(const Base *base, double t) {
+// The integral of a_g over the first `length` seconds of a piece [m/s].
+static double modal_run_piece_speed(const Base *base, const BasePiece *piece, double length) {
     const double omega = base->omega;
+    if (piece->value == 0 && piece->slope == 0)
+        return 0;
+    return omega == 0
+               ? length * (piece->value + length / 2 * piece->slope)
+               : (piece->value * sin(omega * length) + piece->slope * (1 - cos(omega * length))) /
+                     omega;
+}
+
+// The integral of a_g up to t, of a base in closed form [m/s].
+static double modal_run_base_speed(const ModalRun *run, double t) {
+    const Base *base = run->base;
     double speed = 0;
     if (base->form == BASE_SINE)
-        return t > 0 ? base->amplitude / omega * (1 - cos(omega * t)) : 0;
-    for (size_t i = 0; i < base->piece_count && t > base->pieces[i].time; i++) {
-        const BasePiece *piece = &base->pieces[i];
-        const double end = i + 1 < base->piece_count ? fmin(t, base->pieces[i + 1].time) : t;
-        const double length = end - piece->time;
-        speed +=
-            omega == 0
-                ? length * (piece->value + length / 2 * piece->slope)
-                : (piece->value * sin(omega * length) + piece->slope * (1 - cos(omega * length))) /
-                      omega;
-    }
+        return t > 0 ? base->amplitude / base->omega * (1 - cos(base->omega * t)) : 0;
+    for (size_t i = 0; i < base->piece_count && t > base->pieces[i].time; i++)
+        speed += i + 1 < base->piece_count && t >= base->pieces[i + 1].time
+                     ? run->piece_speeds[i]
+                     : modal_run_piece_speed(base, &base->pieces[i], t - base->pieces[i].time);
     return speed;
 }
 
 // a_g at t; of a base in closed form the mean over a step around t, because a pulse may be shorter
 // than that.
-static double modal_run_base(const Base *base, double t, double step) {
+static double modal_run_base(const ModalRun *run, double t) {
+    const Base *base = run->base;
+    const double step = run->step;
     if (base->form != BASE_SAMPLED)
-        return (modal_run_base_speed(base, t + step / 2) -
-                modal_run_base_speed(base, t - step / 2)) /
+        return (modal_run_base_speed(run, t + step / 2) - modal_run_base_speed(run, t - step / 2)) /
                step;
     const double index = t / base->interval;
     const size_t at = (size_t)index;
@@ -131,20 +141,36 @@ static double modal_run_base(const Base *base, double t, double step) {
     return base->values[at] + (index - (double)at) * (base->values[at + 1] - base->values[at]);
 }
 
+// Length of a step [s].
+static double truncation_step(double duration, double sample_rate, double base_interval,
+                              double fastest, size_t modes) {
+    const double interval = 1 / sample_rate;
+    double step = interval;
+    if (base_interval > 0)
+        step = base_interval / ceil(base_interval / fmin(interval, base_interval) * (1 - 1e-9));
+    else // no sine, corner of a pulse or release may fall between two steps of the fastest mode
+        step = fmin(step, RADIANS / fastest);
+    return fmax(step, duration * (double)modes / STEPS_MAX);
+}
+
+double truncation_cost(double duration, double sample_rate, double base_interval, double fastest,
+                       size_t modes) {
+    const double step = truncation_step(duration, sample_rate, base_interval, fastest, modes);
+    return duration / step * (BASE_STEP + MODE_STEP * (double)modes);
+}
+
 static void modal_run_all(ModalRun *run) {
     const Base *base = run->base;
-    const double duration = run->plan->duration, interval = 1 / run->plan->sample_rate;
-    double step = interval;
-    if (base->form == BASE_SAMPLED)
-        step = base->interval / ceil(base->interval / fmin(interval, base->interval) * (1 - 1e-9));
-    else // no sine, corner of a pulse or release may fall between two steps of the fastest mode
-        step = fmin(step, RADIANS / fmax(base->omega, run->plan->modes.omega[run->n - 1]));
-    step = fmax(step, duration * (double)run->n / STEPS_MAX);
+    const double duration = run->plan->duration;
+    const double fastest = fmax(base->omega, run->plan->modes.omega[run->n - 1]);
+    const double step =
+        truncation_step(duration, run->plan->sample_rate,
+                        base->form == BASE_SAMPLED ? base->interval : 0, fastest, run->n);
     run->step = step;
     modal_run_recurrence(run);
     // The first sample counts for a whole interval, however fast a mode decays.
     const Modes *modes = &run->plan->modes;
-    run->count = fmax(interval / step, 1);
+    run->count = fmax(1 / run->plan->sample_rate / step, 1);
     for (size_t k = 0; k < run->n; k++) {
         const double q = run->q[k], p = run->p[k];
         const double absolute =
@@ -155,13 +181,17 @@ static void modal_run_all(ModalRun *run) {
         run->products[k] = run->count * q * run->q[0];
         run->pulls[k] = run->absolutes[k] = run->count * absolute * absolute;
     }
-    double a = modal_run_base(base, 0, step);
-    for (double i = 1; i <= ceil(duration / step * (1 - 1e-9)); i++) {
-        if (fmod(i, PROGRESS_STEPS) == 0 && !progress_advance(run->progress, 0)) {
+    for (size_t i = 0; i + 1 < base->piece_count; i++)
+        run->piece_speeds[i] = modal_run_piece_speed(
+            base, &base->pieces[i], base->pieces[i + 1].time - base->pieces[i].time);
+    double a = modal_run_base(run, 0);
+    const double steps = ceil(duration / step * (1 - 1e-9));
+    for (size_t i = 1; (double)i <= steps; i++) {
+        if (i % PROGRESS_STEPS == 0 && !progress_advance(run->progress, 0)) {
             run->is_stopped = true;
             return;
         }
-        const double next = modal_run_base(base, i * step, step);
+        const double next = modal_run_base(run, (double)i * step);
         modal_run_step(run, a, (next - a) / step);
         a = next;
     }

@@ -154,6 +154,11 @@ typedef struct TruncationError {
 Status truncation_predict(const Plan *plan, const Scene *scene, const Progress *progress,
                           TruncationError *errors);
 
+// What that takes in solver steps, with `modes` modes. The base has samples every `base_interval`,
+// or a closed form (0); nothing moves faster than `fastest` [rad/s].
+double truncation_cost(double duration, double sample_rate, double base_interval, double fastest,
+                       size_t modes);
+
 // The share of the lowest `kept` modes in the mass that the base moves, r' M r; 1 where it moves
 // none.
 double truncation_moved_mass(const Plan *plan, size_t kept);

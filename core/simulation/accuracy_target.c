@@ -359,6 +359,9 @@ Cost accuracy_target_cost(const Simulation *simulation) {
     if (target_make(&target, simulation, NULL, NULL) == STATUS_OK) {
         const Candidate candidate = target_choose(&target, target.asked->target);
         cost = candidate_cost(simulation, &candidate);
+        if (target.left_out != NULL)
+            cost.steps += cost_truncation(simulation);
+        cost.cpu_seconds = cost.steps * SOLVER_STEP;
     }
     target_clear(&target);
     return cost;

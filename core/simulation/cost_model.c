@@ -15,6 +15,13 @@ static const double VALUE = 0.5, VALUE_MODE = 0.04;
 // solvers that step. Measured by tests/bench/bench_cost.c.
 static const double EXACT_STEP = 0.65, POWER_STEP = 0.75, STEPPED_STEP = 1.15;
 static const double MODES = 2; // storeys cubed
+
+// A random base: a value of the fade, a bin, a sample in memory that is new to the process, and a
+// value of the transform of a block, which does not fit in the caches above FAST_COARSE.
+static const double FADE = 0.07, NORMAL_PAIR = 0.25, NEW_SAMPLE = 0.14, COARSE = 0.08,
+                    COARSE_DOUBLING = 0.06, FAST_COARSE = 1 << 18;
+// When a block is made by a transform that is shorter (core/math/sparse_spectrum.c).
+static const double SPARSE_BINS = 16, SPARSE_RATIO_MIN = 8, SPARSE_RATIO_MAX = 1024;
 static const double RUN = 200; // plan, memory and summary
 static const double RUN_BYTES = 1e5;
 static const double FRAME_ARCS = 14, BLOW_ARCS = 5; // Taylor steps of a contact, of an impulse
@@ -61,6 +68,29 @@ static double cost_base_samples(const Simulation *simulation) {
         return 0;
     const double lasts = kind->lasts != NULL ? kind->lasts(excitation) : INFINITY;
     return fmin(lasts, simulation->scene.duration) / interval;
+}
+
+// The base's motion beside its samples: a random one is made of blocks (core/excitation/random.c),
+// two at least, however short the run is.
+static double cost_base(const Simulation *simulation, double *bytes) {
+    const Excitation *excitation = scene_excitation(&simulation->scene);
+    const double samples = cost_base_samples(simulation);
+    *bytes = 0;
+    if (excitation_kind(excitation) != &excitation_random || samples == 0)
+        return samples * excitation_kind(excitation)->effort;
+    const RandomBlocks blocks = random_blocks((const ExcitationRandom *)(const void *)excitation);
+    const double hop = (double)blocks.length / 2, bins = (double)(blocks.first_bin + blocks.bins);
+    double coarse = (double)blocks.length;
+    while (coarse >= SPARSE_BINS * bins && 2 * hop / coarse < SPARSE_RATIO_MAX)
+        coarse /= 2;
+    if (2 * hop / coarse < SPARSE_RATIO_MIN)
+        coarse = 2 * hop;
+    const double transform =
+        coarse * (COARSE + COARSE_DOUBLING * fmax(log2(coarse / FAST_COARSE), 0));
+    *bytes = sizeof(double) * (3 * coarse + hop + bins);
+    return samples * excitation_kind(excitation)->effort + hop * FADE +
+           NEW_SAMPLE * fmax(samples - FAST_COARSE / 2, 0) +
+           (ceil(samples / hop) + 1) * ((double)blocks.bins * NORMAL_PAIR + transform);
 }
 
 // Each kink of the base between samples ends a Taylor step and starts another.
@@ -140,6 +170,22 @@ static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
            (samples * flight + arcs * arc + impacts * (contact + 2 * event + 2 * arc));
 }
 
+double cost_truncation(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const Excitation *excitation = scene_excitation(scene);
+    const Structure *structure = scene_structure(scene);
+    StructureRates rates;
+    if (structure_rates(structure, SIZE_MAX, &rates) != STATUS_OK)
+        rates = (StructureRates){0}; // without memory: the run reports it
+    const double own = excitation_kind(excitation)->fastest != NULL
+                           ? excitation_kind(excitation)->fastest(excitation)
+                           : 0;
+    return truncation_cost(scene->duration, scene->sample_rate,
+                           simulation_base_interval(simulation), fmax(own, rates.fastest),
+                           structure_storeys(structure)) +
+           cost_base(simulation, &(double){0});
+}
+
 // Steps of a solver with its own cost function.
 static double cost_own_steps(const Simulation *simulation) {
     Plan *plan;
@@ -215,12 +261,17 @@ Cost cost_scene(const Simulation *simulation) {
     Cost cost = {.spectra = cost_spectra(&output->psd, scene_sample_count(scene)) +
                             channel * (double)output->psd.channels.count,
                  .output = channel * (double)output->channels.count};
+    double base_bytes;
+    cost.base = cost_base(simulation, &base_bytes);
     cost_add_bytes(simulation, &cost);
-    cost.base = cost_base_samples(simulation) * excitation_kind(scene_excitation(scene))->effort;
-    cost.steps = RUN + cost.output + cost.spectra + cost.base + MODES * modes * modes * modes +
-                 cost_step(simulation) * (simulation_solver(simulation)->cost != NULL
-                                              ? cost_own_steps(simulation)
-                                              : cost_exact_steps(simulation, &cost.is_fast));
+    cost.bytes += base_bytes;
+    if (simulation_modes(simulation, structure_storeys(scene_structure(scene))) <
+        structure_storeys(scene_structure(scene)))
+        cost.steps = cost_truncation(simulation);
+    cost.steps += RUN + cost.output + cost.spectra + cost.base + MODES * modes * modes * modes +
+                  cost_step(simulation) * (simulation_solver(simulation)->cost != NULL
+                                               ? cost_own_steps(simulation)
+                                               : cost_exact_steps(simulation, &cost.is_fast));
     cost.cpu_seconds = cost.steps * SOLVER_STEP;
     return cost;
 }

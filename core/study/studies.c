@@ -42,19 +42,23 @@ void study_request_clear(StudyRequest *request) {
 
 static const double studies_max_runs = 10; // cost limit of a study, in runs at their limit
 
+double study_max_steps(const Variant *study, const SimulationLimits *limits) {
+    const double runs = study_kind(study)->max_runs;
+    return (runs > 0 ? runs : studies_max_runs) * limits->steps;
+}
+
 static Status studies_check_cost(const StudyRequest *request, const SimulationLimits *limits,
                                  Problem *problem) {
     if (limits == NULL || !(limits->steps > 0))
         return STATUS_OK;
     Cost cost;
-    const StudyKind *kind = study_kind(request->study);
-    const double max = (kind->max_runs > 0 ? kind->max_runs : studies_max_runs) * limits->steps;
+    const double max = study_max_steps(request->study, limits);
     TRY(study_request_cost(request, limits, &cost, problem));
     if (cost.steps <= max)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
                        "would take about %.2g s of CPU in all, at most %.4g s are allowed: %s",
-                       cost.cpu_seconds, max * SOLVER_STEP, kind->shorten);
+                       cost.cpu_seconds, max * SOLVER_STEP, study_kind(request->study)->shorten);
 }
 
 Status study_request_complete(StudyRequest *request, const SimulationLimits *limits,

@@ -269,6 +269,9 @@ void study_request_clear(StudyRequest *request);
 Status study_request_complete(StudyRequest *request, const SimulationLimits *limits,
                               Warnings *warnings, Problem *problem);
 
+// That limit in solver steps; 0: none.
+double study_max_steps(const Variant *study, const SimulationLimits *limits);
+
 // Estimated cost of the whole. `problem` may be NULL.
 Status study_request_cost(const StudyRequest *request, const SimulationLimits *limits, Cost *cost,
                           Problem *problem);

@@ -85,9 +85,13 @@ typedef struct Task {
     Job *jobs;                  // that wait for it, by next_shared; holds a reference to each
     Subscribers result_waiters; // readers of the outcome
     atomic_bool is_stopped;
-    atomic_uint progress;   // in 1/10,000
-    struct StudyRun *study; // while it runs, under the lock
-    RunResult run_result;   // once is_saving
+    atomic_uint progress;       // in 1/10,000
+    double cpu_seconds;         // allowed; 0: any. It is stopped at SIMULATION_PATIENCE times this
+    const char *shorten;        // what makes it shorter
+    atomic_int_fast64_t cpu_ns; // used by all workers
+    atomic_bool is_too_long;    // it was stopped for that
+    struct StudyRun *study;     // while it runs, under the lock
+    RunResult run_result;       // once is_saving
     ResultSummary *summary;
     size_t saving_bytes;
     Job *committing; // of its jobs, those whose last state is being written
@@ -188,9 +192,17 @@ void job_lock(Job *job);
 void job_unlock(Job *job);
 bool task_is_shared(const Task *task); // its study has members, which all workers make
 Task *task_of(QueueEntry *entry);
-// A Progress's advance: sets a task's progress. False once it was stopped.
+// A Progress's advance: sets a task's progress. False once it was stopped, or has used too much CPU
+// time.
 bool task_advance(void *task, double fraction);
 bool task_is_wanted(void *task, double fraction); // does not set it
+// From here on this thread's CPU time counts for the task that it reports progress of.
+void task_count_cpu(void);
+// What a task is allowed from its start on, as a run or with its study.
+void task_allow_run(Task *task);
+void task_allow_study(Task *task);
+// STATUS_LIMIT in place of the STATUS_CANCELLED of a task that used too much CPU time.
+Status task_result(const Task *task, Status status, Problem *problem);
 
 // With the lock held:
 

@@ -188,7 +188,7 @@ static bool study_advance_task(void *context, double fraction) {
     unsigned last = atomic_load(&task->progress);
     while (last < reached && !atomic_compare_exchange_weak(&task->progress, &last, reached))
         ;
-    return !atomic_load(&task->is_stopped);
+    return task_is_wanted(task, fraction);
 }
 
 static bool study_is_over(StudyRun *run) {
@@ -568,7 +568,8 @@ static void study_finish(Worker *worker, StudyRun *run, Problem *problem) {
     Task *task = run->task;
     if (!run->is_failed && !atomic_load(&task->is_stopped)) {
         const int64_t began_ns = clock_thread_cpu_ns();
-        const Status status = study_complete(worker, run, problem);
+        task_count_cpu();
+        const Status status = task_result(task, study_complete(worker, run, problem), problem);
         job_metrics_study(&manager->metrics, false, clock_thread_cpu_ns() - began_ns);
         if (status != STATUS_OK)
             run_result_fail(&run->run_result, status, problem);
@@ -609,8 +610,11 @@ void study_work(Worker *worker, const StudyTurn *turn, Problem *problem) {
     const int64_t began_ns = clock_monotonic_ns(), began_cpu_ns = clock_thread_cpu_ns();
     TurnClock clock = {began_ns, began_ns, 0};
     problem_clear(problem);
-    const Status status = turn->chunk != NULL ? study_make_rows(worker, turn, &clock, problem)
-                                              : study_make_members(worker, turn, &clock, problem);
+    task_count_cpu();
+    Status status = turn->chunk != NULL ? study_make_rows(worker, turn, &clock, problem)
+                                        : study_make_members(worker, turn, &clock, problem);
+    (void)task_is_wanted(run->task, 1);
+    status = task_result(run->task, status, problem);
     const double seconds = 1e-9 * (double)(clock_monotonic_ns() - began_ns);
     job_metrics_study(&manager->metrics, false, clock_thread_cpu_ns() - began_cpu_ns);
     pthread_mutex_lock(&manager->lock);

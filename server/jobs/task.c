@@ -319,17 +319,57 @@ static void task_estimate(Task *task) {
     task->bytes = (uint64_t)fmin(whole.bytes, 1e18);
 }
 
+// Until when this thread's CPU time was counted.
+static _Thread_local int64_t task_counted_ns;
+
+void task_count_cpu(void) {
+    task_counted_ns = clock_thread_cpu_ns();
+}
+
+// A series that is computed again was within the limits when it was computed first.
+void task_allow_run(Task *task) {
+    const double steps = task->manager->settings.limits.steps;
+    task->cpu_seconds = task->recompute_only ? 0 : steps * SOLVER_STEP;
+    task->shorten = "take a shorter duration, or fewer samples";
+    atomic_store(&task->cpu_ns, 0);
+    atomic_store(&task->is_too_long, false);
+}
+
+void task_allow_study(Task *task) {
+    const JobManagerSettings *settings = &task->manager->settings;
+    const Variant *study = task->inquiry.study;
+    const double own = study_max_steps(study, &settings->limits) * SOLVER_STEP;
+    const bool is_less = settings->study_seconds > 0 && !(own > 0 && own < settings->study_seconds);
+    task->cpu_seconds = is_less ? settings->study_seconds : own;
+    task->shorten = study_kind(study)->shorten;
+}
+
+bool task_is_wanted(void *context, double fraction) {
+    Task *task = context;
+    (void)fraction;
+    const int64_t now_ns = clock_thread_cpu_ns(), more_ns = now_ns - task_counted_ns;
+    task_counted_ns = now_ns;
+    const double used = 1e-9 * (double)(atomic_fetch_add(&task->cpu_ns, more_ns) + more_ns);
+    if (task->cpu_seconds > 0 && used > SIMULATION_PATIENCE * task->cpu_seconds)
+        atomic_store(&task->is_too_long, true);
+    return !atomic_load(&task->is_stopped) && !atomic_load(&task->is_too_long);
+}
+
 bool task_advance(void *context, double fraction) {
     Task *task = context;
     const double share = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
     atomic_store(&task->progress, (unsigned)(share * 10000));
-    return !atomic_load(&task->is_stopped);
+    return task_is_wanted(task, fraction);
 }
 
-bool task_is_wanted(void *context, double fraction) {
-    const Task *task = context;
-    (void)fraction;
-    return !atomic_load(&task->is_stopped);
+Status task_result(const Task *task, Status status, Problem *problem) {
+    if (status != STATUS_CANCELLED || !atomic_load(&task->is_too_long))
+        return status;
+    problem_clear(problem);
+    return problem_set(problem, STATUS_LIMIT,
+                       "took %g s of CPU, %d times the %g s that are allowed: %s",
+                       SIMULATION_PATIENCE * task->cpu_seconds, SIMULATION_PATIENCE,
+                       task->cpu_seconds, task->shorten);
 }
 
 void jobs_call_worker(JobManager *manager) {

@@ -62,6 +62,8 @@ static void worker_run(Worker *worker, Task *task, RunResult *run_result, Proble
     problem_clear(problem);
     run_result->began_ns = clock_monotonic_ns();
     const int64_t run_ns = clock_thread_cpu_ns();
+    task_count_cpu();
+    task_allow_run(task);
     Status status = request_load_records(manager->db, &task->inquiry, problem);
     if (status == STATUS_OK)
         status = simulation_run(&task->inquiry.simulation, limits, &watch, &worker->workspace,
@@ -71,6 +73,7 @@ static void worker_run(Worker *worker, Task *task, RunResult *run_result, Proble
     if (status == STATUS_OK)
         job_metrics_run(&manager->metrics, run_result->outcome, study_ns - run_ns);
     if (status == STATUS_OK && is_measured) {
+        task_allow_study(task);
         status = worker_run_study(worker, task, run_result, problem);
         job_metrics_study(&manager->metrics, true, clock_thread_cpu_ns() - study_ns);
     }
@@ -80,6 +83,7 @@ static void worker_run(Worker *worker, Task *task, RunResult *run_result, Proble
         if (status == STATUS_OK && is_measured)
             status = run_result_add_to_study(run_result, problem);
     }
+    status = task_result(task, status, problem);
     if (status != STATUS_OK)
         run_result_fail(run_result, status, problem);
     run_result->status = status;
@@ -168,7 +172,9 @@ static void worker_compute(Worker *worker, Task *task, Problem *problem) {
     const bool is_shared = run_result.status == STATUS_OK && task_is_shared(task);
     if (is_shared) {
         problem_clear(problem);
-        const Status status = study_start(worker, task, &run_result, problem);
+        task_allow_study(task);
+        const Status status =
+            task_result(task, study_start(worker, task, &run_result, problem), problem);
         if (status != STATUS_OK)
             run_result_fail(&run_result, status, problem);
     }
