@@ -570,16 +570,19 @@ Status material_measurement_add(Sqlite *database, const MaterialMeasurement *mea
         "coalesce(json_array_length(:document, '$.drops'), 0) AS drops, "
         "coalesce(json_array_length(:document, '$.traces'), 0) AS traces";
     MaterialMeasurement stored = *measurement; // borrows
-    stored.head = NULL;
+    MaterialMeasurement found = {0};
     TRY(require_number(measurement->measurement, CATALOGUE_MEASUREMENTS, measurement->slug,
                        "measurements", problem));
     TRY(room_reserve(database, length(measurement->comment) + length(measurement->document),
                      problem));
     TRY(sqlite_first(database, head_sql, material_measurement_columns, measurement,
-                     material_measurement_columns, &stored, NULL, problem));
+                     material_measurement_columns, &found, NULL, problem));
+    stored.head = found.head;
+    stored.drops = found.drops;
+    stored.traces = found.traces;
     const Status status =
         sqlite_change(database, sql, material_measurement_columns, &stored, NULL, problem);
-    free(stored.head);
+    free(found.head);
     return status;
 }
 
@@ -589,9 +592,11 @@ Status audit_entry_add(Sqlite *database, const AuditEntry *entry, Problem *probl
         "SELECT 1 + coalesce(max(t.version), 0) AS version FROM material_trail t JOIN materials m "
         "ON m.number = t.material WHERE m.slug = :slug";
     AuditEntry stored = *entry; // borrows
+    AuditEntry found = {0};
     TRY(room_reserve(database, length(entry->why), problem));
-    TRY(sqlite_first(database, version_sql, audit_columns, entry, audit_columns, &stored, NULL,
+    TRY(sqlite_first(database, version_sql, audit_columns, entry, audit_columns, &found, NULL,
                      problem));
+    stored.version = found.version;
     return sqlite_change(database, sql, audit_columns, &stored, NULL, problem);
 }
 

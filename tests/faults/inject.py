@@ -1,17 +1,21 @@
 #!/usr/bin/env python3
 """Every allocation or file call of the canonical requests fails in turn, once and from then on: the daemon refuses, and goes on.
 
-    tests/faults/inject.py --build build allocations|EIO|ENOSPC|short [--stride 1] [REQUEST...]
+    tests/faults/inject.py --build build allocations|EIO|ENOSPC|short [--stride 1] [--processes 8] [REQUEST...]
 
-The suite runs a few of them (tests/contract/test_faults.py)."""
+Much of the time is waiting: what could not be stored is tried again after a second. So the numbers are dealt to processes, each with
+a daemon of its own. The suite runs a few of them (tests/contract/test_faults.py)."""
 import argparse
 import collections
+import concurrent.futures
 import gzip
 import http.client
 import os
+import shutil
 import sys
 import tempfile
-import shutil
+import threading
+import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -22,6 +26,7 @@ from control import ALLOCATIONS, KINDS, Control  # noqa: E402
 # What a failed call may be answered with: no memory or no room now, or a disk that cannot be read or written.
 REFUSALS = {"allocations": {503, 507}, "EIO": {500, 503, 507}, "ENOSPC": {500, 503, 507}, "short": {500, 503, 507}}
 TIMEOUT = 25  # [s]
+PERMANENT = 0.3  # a permanent fault ends after an answer, or so long without one [s]
 VARYING = {"metrics", "events"}  # paths whose answers are never the same
 OPTIONS = ("--workers", "1", "--cache-bytes", "0", "--rate", "0", "--journal", "off")
 
@@ -55,10 +60,12 @@ def has_failed(request, reply):
 
 
 class Campaign:
-    def __init__(self, kind, stride=1):
-        self.kind, self.stride = kind, stride
+    """Every `stride`-th number, from `first` on."""
+
+    def __init__(self, kind, stride=1, first=1):
+        self.kind, self.stride, self.first = kind, stride, first
         self.calls, self.error = (ALLOCATIONS, 0) if kind == "allocations" else KINDS[kind]
-        self.outcomes = collections.Counter()
+        self.tried, self.outcomes = 0, collections.Counter()
         self.wrong = []
 
     def fault(self, text):
@@ -90,19 +97,24 @@ class Campaign:
                 count, _ = control.disarm()
                 assert reply is not None and reply.status in right, (name, reply)
             body = reply.body
-            number, before = 2, self.outcomes.total()
+            number = 2
             for permanent in (False, True):
-                for n in range(1, count + 1, self.stride):
+                for n in range(self.first, count + 1, self.stride):
                     where = f"{name}, {'from call' if permanent else 'call'} {n} of {count}"
                     request = make(setup, number)
                     number += 1
+                    self.tried += 1
                     control.arm(n, self.calls, self.error, permanent)
+                    end = threading.Timer(PERMANENT, control.disarm)
+                    end.start()
                     try:
                         reply = send(daemon, request)
                     except TimeoutError:
                         self.outcomes["hung"] += 1
                         self.fault(f"{where}: no answer")
                         reply = None
+                    end.cancel()
+                    end.join()
                     control.disarm()
                     if not daemon.is_alive():
                         self.outcomes["crashed"] += 1
@@ -111,7 +123,6 @@ class Campaign:
                         daemon.start()
                         continue
                     self.judge(daemon, where, request, right, reply)
-            print(f"{name}: {count} calls, {self.outcomes.total() - before} tried", flush=True)
             self.end(daemon, name)
         finally:
             daemon.kill()
@@ -128,6 +139,8 @@ class Campaign:
             self.outcomes["accepted"] += 1
         elif reply.status in REFUSALS[self.kind]:
             self.outcomes["refused"] += 1
+        elif reply.status == 409 and request[0] == "DELETE" and is_temporary(daemon.get(request[1]).json()):
+            self.outcomes["refused"] += 1  # the job that is to be cancelled has failed of the fault
         else:
             self.fault(f"{where}: {reply}")
         is_done = reply is not None and reply.status < 300
@@ -177,18 +190,37 @@ class Campaign:
         daemon.stop(60)
 
 
+def part(kind, stride, first, name):
+    """What a process does: the numbers of a request that are dealt to it."""
+    campaign = Campaign(kind, stride, first)
+    campaign.run([name])
+    return campaign.outcomes, campaign.wrong, campaign.tried
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--build", default=program.build)
     parser.add_argument("--stride", type=int, default=1, help="each so many N")
+    parser.add_argument("--processes", type=int, default=8, help="daemons at the same time")
     parser.add_argument("kind", choices=["allocations", *KINDS])
     parser.add_argument("names", nargs="*", default=list(REQUESTS))
     arguments = parser.parse_args()
     program.build = os.path.abspath(arguments.build)
-    campaign = Campaign(arguments.kind, arguments.stride)
-    campaign.run(arguments.names)
-    print(f"{arguments.kind}: " + ", ".join(f"{count} {what}" for what, count in sorted(campaign.outcomes.items())))
-    return 1 if campaign.wrong else 0
+    outcomes, wrong = collections.Counter(), []
+    stride = arguments.stride * arguments.processes
+    began = time.monotonic()
+    with concurrent.futures.ProcessPoolExecutor(arguments.processes) as pool:
+        firsts = range(1, stride + 1, arguments.stride)
+        parts = {name: [pool.submit(part, arguments.kind, stride, first, name) for first in firsts] for name in arguments.names}
+        for name, done in parts.items():
+            tried = 0
+            for one in done:
+                outcomes += one.result()[0]
+                wrong += one.result()[1]
+                tried += one.result()[2]
+            print(f"{name}: {tried} tried, after {time.monotonic() - began:.0f} s", flush=True)
+    print(f"{arguments.kind}: " + ", ".join(f"{count} {what}" for what, count in sorted(outcomes.items())))
+    return 1 if wrong else 0
 
 
 if __name__ == "__main__":
