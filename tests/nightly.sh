@@ -9,7 +9,7 @@
 #               schedules of the threads
 #   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
 #   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
-#   faults      every allocation and file call of the canonical requests fails in turn
+#   faults      every allocation and file call of the canonical requests and of commands fails in turn
 #   truth       the long campaigns of tests/truth
 #   storm       a million requests with killed clients and restarts, 10,000 cancels
 #   fuzz        mutated ground motions and material files
@@ -132,9 +132,14 @@ part_faults() {
     build release
     build debug
     local kind
-    # Every N, once and from N on. 600 s
+    # Every N, once and from N on. 1800 s
     for kind in allocations EIO ENOSPC short; do sized '--stride 100' '--stride 1' "$python" tests/faults/inject.py --build build "$kind"; done
+    # The sanitizer looks for leaks at the end of each server. 600 s
     sized '--stride 200' '--stride 7' "$python" tests/faults/inject.py --build build-debug allocations
+    # Starts, copies and checks: every file call; of their 150,000 allocations each 100th. 1800 s
+    for kind in EIO ENOSPC short; do sized '--stride 50' '--stride 1' "$python" tests/faults/commands.py --build build "$kind"; done
+    sized '--stride 5000' '--stride 97' "$python" tests/faults/commands.py --build build allocations
+    sized '--stride 5000' '--stride 997' "$python" tests/faults/commands.py --build build-debug allocations
 }
 
 # Scenes and seed first.

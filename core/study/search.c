@@ -27,6 +27,8 @@ enum {
     ROWS = 160,                         // of the model at most
     RESPONSES = 1 + SEARCH_CONSTRAINTS, // modelled: an objective and the constraints
     PARAMETERS = SEARCH_VARIABLES + 2,  // logarithms of lengths, share and scale of the jumps
+    OPTIMIZER_BYTES = 16384,            // NLopt's, at least
+    OPTIMIZER_VARIABLE_BYTES = 256,     // and of each two variables
     STARTS = 8,                         // of the choice of a candidate
     SCATTER = 3,                        // so many candidates for one that needs no model
     FIRST_FITS = 8,                     // of each parameter
@@ -490,7 +492,12 @@ static Status search_maximise(Search *search, double step, double *share, double
     nlopt_set_upper_bounds1(optimizer, 1);
     nlopt_set_initial_step1(optimizer, step);
     nlopt_set_maxeval(optimizer, (int)(15 + 10 * n));
-    const nlopt_result result = nlopt_optimize(optimizer, share, merit);
+    // NLopt ends the program where it has no memory for its message that it has none, so what it
+    // needs is reserved first and returned to the allocator.
+    void *reserve = malloc(OPTIMIZER_BYTES + OPTIMIZER_VARIABLE_BYTES * n * n);
+    free(reserve);
+    const nlopt_result result =
+        reserve != NULL ? nlopt_optimize(optimizer, share, merit) : NLOPT_OUT_OF_MEMORY;
     nlopt_destroy(optimizer);
     return status_made(result != NLOPT_OUT_OF_MEMORY);
 }

@@ -284,7 +284,7 @@ static int command_run_with(const Command *command, int argc, char *const *argv)
     Options options = {0};
     Problem *problem = calloc(1, sizeof *problem);
     void *settings = calloc(1, command->size + 1);
-    int code = command_exit(STATUS_NO_MEMORY);
+    int code = COMMAND_FAILED;
     if (problem != NULL && settings != NULL && fields_default(fields, settings) == STATUS_OK) {
         Status status =
             options_read(fields, settings, argc, argv, command->environment, &options, problem);
@@ -292,8 +292,10 @@ static int command_run_with(const Command *command, int argc, char *const *argv)
             status = problem_set(problem, STATUS_USAGE, "takes no operands, is given \"%.60s\"",
                                  options.operands[0]);
         code = status == STATUS_OK ? command->run(command, settings, &options, problem)
-                                   : command_error(command->name, problem);
+                                   : command_end(command, status, problem);
         fields_clear(fields, settings);
+    } else {
+        command_print_line(stderr, "impactd %s: %s", command->name, status_title(STATUS_NO_MEMORY));
     }
     free(settings);
     free(problem);

@@ -161,11 +161,12 @@ static Status report_full(const Copying *copying, Problem *problem) {
                        (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize);
 }
 
-static void remove_beside(const char *path, bool removes_path) {
-    static const char *const endings[] = {"-journal", "-wal", "-shm", ""};
-    char name[PATH_MAX + 16];
-    for (size_t i = 0; i < sizeof endings / sizeof *endings - !removes_path; i++) {
-        snprintf(name, sizeof name, "%s%s", path, endings[i]);
+// The files next to a database, those of which the names end with `end` too.
+static void remove_beside(const char *path, const char *end) {
+    static const char *const endings[] = {"-journal", "-wal", "-shm"};
+    char name[PATH_MAX + 32];
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+        snprintf(name, sizeof name, "%s%s%s", path, endings[i], end);
         (void)unlink(name);
     }
 }
@@ -197,12 +198,35 @@ static Status check_restore(const Copying *copying, Problem *problem) {
 }
 
 // The log of the database that is replaced must not be applied to the new one: it is moved into the
-// old one, which thus stays whole until the new one has its name.
+// old one, which thus stays whole until the new one has its name. A log that cannot be moved into
+// it, because it is damaged or cannot be read now, is beside it under another name meanwhile.
 static void finish_replaced(const char *path) {
     Sqlite *replaced;
     if (access(path, F_OK) == 0 && sqlite_open(path, DATABASE_WRITER, &replaced, NULL) == STATUS_OK)
         sqlite_close(replaced);
-    remove_beside(path, false);
+}
+
+static void rename_logs(const char *path, const char *from, const char *to) {
+    static const char *const endings[] = {"-journal", "-wal"};
+    char old_name[PATH_MAX + 32], new_name[PATH_MAX + 32];
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+        snprintf(old_name, sizeof old_name, "%s%s%s", path, endings[i], from);
+        snprintf(new_name, sizeof new_name, "%s%s%s", path, endings[i], to);
+        (void)rename(old_name, new_name);
+    }
+}
+
+static Status replace_restored(Copying *copying, Problem *problem) {
+    static const char aside[] = ".replaced";
+    finish_replaced(copying->target);
+    rename_logs(copying->target, "", aside);
+    remove_beside(copying->target, "");
+    const Status status = rename_part(copying, true, problem);
+    if (copying->part[0] == '\0')
+        remove_beside(copying->target, aside);
+    else
+        rename_logs(copying->target, aside, "");
+    return status;
 }
 
 static Status backup_copy(const BackupRequest *request, bool is_restore, Backup *backup,
@@ -232,14 +256,15 @@ static Status backup_copy(const BackupRequest *request, bool is_restore, Backup 
     sqlite_close(copying->copy);
     if (status == STATUS_OK)
         status = sync_part(copying, problem);
-    if (status == STATUS_OK && is_restore)
-        finish_replaced(copying->target);
-    else if (status == STATUS_OK)
+    if (status == STATUS_OK && !is_restore)
         status = check_target(copying, problem);
     if (status == STATUS_OK)
-        status = rename_part(copying, is_restore || request->replaces, problem);
-    if (copying->part[0] != '\0')
-        remove_beside(copying->part, true);
+        status = is_restore ? replace_restored(copying, problem)
+                            : rename_part(copying, request->replaces, problem);
+    if (copying->part[0] != '\0') {
+        remove_beside(copying->part, "");
+        (void)unlink(copying->part);
+    }
     if (copying->file >= 0)
         close(copying->file);
     if (status == STATUS_FULL)

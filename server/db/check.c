@@ -85,11 +85,14 @@ Status check_run(Sqlite *database, const DbCheck *check, Problem *problem) {
             check->report_table(check->context, (*tables)->name, table.rows, table.damaged);
         damaged += table.damaged;
     }
-    return faults + damaged == 0
-               ? STATUS_OK
-               : problem_set(problem, STATUS_IO,
-                             "the database is damaged: %llu faults of the file, %llu damaged rows",
-                             (unsigned long long)faults, (unsigned long long)damaged);
+    if (faults + damaged == 0)
+        return STATUS_OK;
+    const bool is_unreadable = sqlite_could_not_read(database);
+    return problem_set(problem, STATUS_IO,
+                       "the database %s: %llu faults of the file, %llu damaged rows",
+                       is_unreadable ? "could not be read (Input/output error), try again"
+                                     : "is damaged",
+                       (unsigned long long)faults, (unsigned long long)damaged);
 }
 
 Status check_open(const char *path, Sqlite **source, Problem *problem) {

@@ -36,6 +36,10 @@ struct Sqlite {
     size_t statement_count;
 };
 
+static bool is_full(int code) {
+    return code == ENOSPC || code == EDQUOT || code == EFBIG;
+}
+
 static Status report_full(const char *path, Problem *problem) {
     struct statvfs disk;
     const char *slash = path != NULL ? strrchr(path, '/') : NULL;
@@ -49,6 +53,30 @@ static Status report_full(const char *path, Problem *problem) {
                        "stored can be read, and writing continues when there is room",
                        size, path, left,
                        left > (1 << 26) ? ", so a quota or a limit on files is reached" : "");
+}
+
+static Status report_unreadable(const char *path, Problem *problem) {
+    return problem_set(problem, STATUS_IO,
+                       "%s could not be read (%s): try again; if that does not help, \"impactd "
+                       "check-db\" reports what is damaged",
+                       path, strerror(EIO));
+}
+
+// Why a call of the system failed on this connection, the last one that did; 0: unknown, or none.
+static int system_cause(sqlite3 *connection) {
+    static const int files[] = {SQLITE_FCNTL_FILE_POINTER, SQLITE_FCNTL_JOURNAL_POINTER};
+    for (size_t i = 0; i < COUNT(files); i++) {
+        sqlite3_file *file = NULL;
+        int cause = 0;
+        if (sqlite3_file_control(connection, "main", files[i], &file) == SQLITE_OK &&
+            file != NULL && file->pMethods != NULL && file->pMethods->xFileControl != NULL &&
+            file->pMethods->xFileControl(file, SQLITE_FCNTL_LAST_ERRNO, &cause) == SQLITE_OK &&
+            cause != 0)
+            return cause;
+    }
+    // A file that cannot be opened is looked for in other ways then.
+    const int cause = sqlite3_system_errno(connection);
+    return cause != ENOENT ? cause : 0;
 }
 
 // What SQLite says of a damaged file may have bytes of it.
@@ -70,6 +98,8 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     const char *path = sqlite3_db_filename(connection, "main");
     const bool has_path = path != NULL && path[0] != '\0';
     const int code = sqlite3_errcode(connection) & 0xFF;
+    const bool is_of_system = code == SQLITE_IOERR || code == SQLITE_CANTOPEN;
+    const int cause = system_cause(connection);
     Status status = STATUS_IO;
     char message[200];
     snprintf(message, sizeof message, "%s", sqlite3_errmsg(connection));
@@ -80,16 +110,26 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     if (code == SQLITE_INTERRUPT)
         return problem_set(problem, STATUS_CANCELLED, "%s was interrupted", doing);
     // A quota, or a limit on a file's size, is to SQLite an error of writing.
-    if (code == SQLITE_FULL || sqlite3_extended_errcode(connection) == SQLITE_IOERR_WRITE)
+    if (code == SQLITE_FULL || (is_of_system && is_full(cause)))
         return report_full(path, problem);
+    // A page that cannot be read is to SQLite one that is damaged.
+    if (has_path && (code == SQLITE_NOTADB || code == SQLITE_CORRUPT) && cause == EIO)
+        return report_unreadable(path, problem);
+    if (has_path && code == SQLITE_READONLY)
+        return problem_set(problem, status,
+                           "%s failed: %s, or a file next to it, could not be opened for writing",
+                           doing, path);
     if (has_path && (code == SQLITE_NOTADB || code == SQLITE_CORRUPT))
         return problem_set(
             problem, status,
             "%s is damaged, or no database of SQLite (%s): put a copy of it back, or "
             "move it away, with the files next to it, to start with a new database",
             path, message);
-    return problem_set(problem, status, "%s failed: %s%s%s", doing, message,
-                       has_path ? ", in " : "", has_path ? path : "");
+    return problem_set(problem, status, "%s failed: %s%s%s%s%s%s", doing, message,
+                       is_of_system && cause != 0 ? " (" : "",
+                       is_of_system && cause != 0 ? strerror(cause) : "",
+                       is_of_system && cause != 0 ? ")" : "", has_path ? ", in " : "",
+                       has_path ? path : "");
 }
 
 Status sqlite_execute(Sqlite *database, const char *sql, Problem *problem) {
@@ -744,10 +784,17 @@ Status sqlite_open(const char *path, SqliteMode mode, Sqlite **database, Problem
     const int code = sqlite3_open_v2(path != NULL ? path : ":memory:", &made->connection,
                                      SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL);
     Status status = STATUS_OK;
-    if (code != SQLITE_OK) {
+    const int cause = made->connection != NULL ? system_cause(made->connection) : 0;
+    if (code != SQLITE_OK && code != SQLITE_NOMEM && is_full(cause)) {
+        status = report_full(path, problem);
+    } else if (code != SQLITE_OK) {
         status = problem_set(problem, code == SQLITE_NOMEM ? STATUS_NO_MEMORY : STATUS_IO,
-                             "cannot open %s: %s", path != NULL ? path : "a database in memory",
-                             sqlite3_errstr(code));
+                             "cannot open %s: %s%s%s", path != NULL ? path : "a database in memory",
+                             sqlite3_errstr(code), cause != 0 ? ": " : "",
+                             cause != 0 ? strerror(cause) : "");
+    } else if (mode != DATABASE_READER && sqlite3_db_readonly(made->connection, "main") == 1) {
+        // SQLite tries that where opening it for writing fails.
+        status = problem_set(problem, STATUS_IO, "cannot open %s for writing", path);
     } else {
         sqlite3_extended_result_codes(made->connection, 1);
         sqlite3_busy_timeout(made->connection, 5000);
@@ -961,6 +1008,10 @@ Status sqlite_check(Sqlite *database, void (*report_found)(void *context, const 
         }
     free(found.at);
     return STATUS_OK;
+}
+
+bool sqlite_could_not_read(Sqlite *database) {
+    return system_cause(database->connection) == EIO;
 }
 
 static int ask(void *watch) {

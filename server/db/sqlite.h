@@ -178,6 +178,8 @@ Status sqlite_copy(Sqlite *from, Sqlite *to, const Progress *watch, Problem *pro
 // hundred sentences; *count is their number.
 Status sqlite_check(Sqlite *database, void (*report)(void *context, const char *damage),
                     void *context, uint64_t *count, Problem *problem);
+// Whether a read failed on this connection: what seems damaged may be whole.
+bool sqlite_could_not_read(Sqlite *database);
 // Until NULL is given, long statements ask `watch` whether to continue; STATUS_CANCELLED if not.
 void sqlite_watch(Sqlite *database, const Progress *watch);
 

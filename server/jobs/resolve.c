@@ -305,7 +305,8 @@ static Status resolve_buffer(Db *db, Buffer *buffer, const char *pointer, Warnin
     if (found != NULL)
         refcount_unref(&found->refcount);
     if (status != STATUS_OK && status != STATUS_INVALID)
-        problem_set(problem, status, "the material \"%.80s\" could not be looked up", slug);
+        problem_set(problem, status, "the material \"%.80s\" could not be looked up: %s", slug,
+                    status_title(status));
     return status;
 }
 
@@ -368,7 +369,8 @@ static Status record_find(Db *db, const char *name, const char *digest, const ch
     if (status == STATUS_NOT_FOUND)
         return record_refuse_unknown(db, name, pointer, problem);
     if (status != STATUS_OK)
-        return problem_set(problem, status, "the record \"%.64s\" could not be looked up", name);
+        return problem_set(problem, status, "the record \"%.64s\" could not be looked up: %s", name,
+                           status_title(status));
     if (digest == NULL || strcmp(digest, (*named)->digest) == 0)
         return STATUS_OK;
     Fault fault = resolve_fault(place, digest);

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Some allocations and file calls of the canonical requests fail. All of them: tests/faults/inject.py."""
+"""Some allocations and file calls of the canonical requests and of commands fail. All of them: tests/faults/inject.py, commands.py."""
 import os
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "faults"))
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import commands  # noqa: E402
 import inject  # noqa: E402
 import program  # noqa: E402
 
@@ -16,6 +17,10 @@ def tried(kind, stride, *names, first=1):
     """A campaign without a fault; returns how many calls failed."""
     campaign = inject.Campaign(kind, stride, first)
     campaign.run(names)
+    return judged(campaign)
+
+
+def judged(campaign):
     assert not campaign.wrong, campaign.wrong[:3]
     return campaign.tried
 
@@ -28,6 +33,20 @@ def test_a_row_that_borrows_is_not_freed():
 def test_a_failed_allocation_is_answered_503():
     """One allocation of a request fails, or all from then on: 503, no crash, and the next request is answered."""
     assert tried("allocations", 13, "version", "material", "materials", "series csv", "derived", "export csv", "explain", "run", "material put") > 200
+
+
+def test_a_disk_that_does_not_answer_is_not_called_damaged():
+    """check-db where a read fails, once or from then on: it says that reading failed, and not that the database is damaged."""
+    campaign = commands.Campaign("EIO", 25)
+    campaign.run("check")
+    assert judged(campaign) > 15
+
+
+def test_a_command_without_memory_says_so():
+    """A copy of the database where an allocation fails, the first one too: exit code 1 with the reason, and no file."""
+    campaign = commands.Campaign("allocations", 2500)
+    campaign.run("backup")
+    assert judged(campaign) > 10
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ static size_t folder_length;
 static _Atomic bool is_inside[MAX_FILES]; // by descriptor
 
 // Code of libraries that abort or crash when an allocation of theirs fails, by themselves: these are left out.
-static const char *const fragile[] = {"libfftw3", "libsundials", "liblapack", "libblas", "libopenblas"};
+static const char *const fragile[] = {"libfftw3", "libsundials", "libnlopt", "liblapack", "libblas", "libopenblas"};
 enum { FRAGILE = sizeof fragile / sizeof *fragile, MAX_RANGES = 64 };
 static struct {
     uintptr_t from, to;
@@ -197,8 +197,8 @@ static int opened(int fd, bool inside)
     return fd;
 }
 
-#define OPEN_AT(name) \
-    int name(int at, const char *path, int flags, ...) \
+#define OPEN(name, at, values, ...) \
+    int name(__VA_ARGS__, ...) \
     { \
         NEXT(name); \
         va_list more; \
@@ -206,24 +206,12 @@ static int opened(int fd, bool inside)
         mode_t mode = flags & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY)) ? va_arg(more, mode_t) : 0; \
         va_end(more); \
         bool inside = path_is_inside(at, path); \
-        return inside && file_fails(CALL_OPEN) ? -1 : opened(next(at, path, flags, mode), inside); \
+        return inside && file_fails(CALL_OPEN) ? -1 : opened(next values, inside); \
     }
-OPEN_AT(openat)
-OPEN_AT(openat64)
-
-#define OPEN(name) \
-    int name(const char *path, int flags, ...) \
-    { \
-        NEXT(name); \
-        va_list more; \
-        va_start(more, flags); \
-        mode_t mode = flags & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY)) ? va_arg(more, mode_t) : 0; \
-        va_end(more); \
-        bool inside = path_is_inside(-1, path); \
-        return inside && file_fails(CALL_OPEN) ? -1 : opened(next(path, flags, mode), inside); \
-    }
-OPEN(open)
-OPEN(open64)
+OPEN(open, -1, (path, flags, mode), const char *path, int flags)
+OPEN(open64, -1, (path, flags, mode), const char *path, int flags)
+OPEN(openat, at, (at, path, flags, mode), int at, const char *path, int flags)
+OPEN(openat64, at, (at, path, flags, mode), int at, const char *path, int flags)
 
 int close(int fd)
 {

@@ -1,0 +1,248 @@
+#!/usr/bin/env python3
+"""Every allocation or file call of a command fails in turn, once and from then on: it does its work, or says why not and changes nothing.
+
+    tests/faults/commands.py --build build allocations|EIO|ENOSPC|short [--stride 1] [--processes 4] [COMMAND...]
+
+Starts of the server (with a new database, and with jobs to continue), copies, checks and files of results. After each fault the
+database is whole, in its old state or the new one, and the command without a fault succeeds. The suite runs a few of them
+(tests/contract/test_faults.py)."""
+import argparse
+import collections
+import concurrent.futures
+import contextlib
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import program  # noqa: E402
+from control import ALLOCATIONS, KINDS, Control  # noqa: E402
+
+TIMEOUT = 60  # [s]
+# What a message says of a fault. A disk that did not answer once is not called damaged.
+WORDS = {"allocations": ("memory",), "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing"), 
+         "ENOSPC": ("No space", "no room", "cannot open", "could not be opened", "unable to open"), "short": ("",)}
+SERVE = ("serve", "--listen", "127.0.0.1:0", "--workers", "1", "--data", "{}/data")
+MOTION = "PEER\nrecord\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 4, DT= .0200 SEC\n0.1 -0.2 0.3 -0.1\n"
+
+
+def prepare(folder):
+    """What the commands find: a database with results and unfinished jobs, a copy of an earlier state, a ground motion, a scene."""
+    data = os.path.join(folder, "data")
+    scene = program.scene("paper_free_sponge")
+    scene["duration"] = 2
+    daemon = program.Daemon(program.build, "--workers", "1", data=data)
+    daemon.start()
+    try:
+        assert daemon.submit(scene, wait=20).json()["status"] == "successful"
+        code, _, said = program.run("backup", os.path.join(folder, "copy.db"), "--data", data)
+        assert code == 0, said
+        long = {**scene, "duration": 10, "accuracy": {"solver": "rk4", "step": 1e-4}}
+        for number in range(3):
+            long["dampers"][0]["clearance"] = 0.012 + 1e-5 * number
+            assert daemon.submit(long, headers={"Prefer": "respond-async"}).status == 202
+    finally:
+        daemon.kill()
+    for name, text in (("motion.AT2", MOTION), ("scene.json", program.json.dumps(scene))):
+        with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+            file.write(text)
+
+
+def contents(path, scratch):
+    """All rows of a database that is whole; None without a file, {} without tables. The file and its log are left as they are."""
+    if not os.path.exists(path):
+        return None
+    shutil.rmtree(scratch, ignore_errors=True)
+    os.mkdir(scratch)
+    for ending in ("", "-wal", "-journal"):
+        with contextlib.suppress(FileNotFoundError):
+            shutil.copy(path + ending, scratch)
+    with contextlib.closing(sqlite3.connect(os.path.join(scratch, os.path.basename(path)))) as connection:
+        verdict = connection.execute("PRAGMA integrity_check").fetchall()
+        assert verdict == [("ok",)], verdict
+        tables = [row[0] for row in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'")]
+        return {table: sorted(map(repr, connection.execute(f"SELECT * FROM {table}"))) for table in tables}
+
+
+def count(rows):
+    return {table: len(of) for table, of in (rows or {}).items()}
+
+
+class Case:
+    """A command in a folder of its own; `before` and `after` are the states of the file that it writes."""
+
+    def __init__(self, *arguments, target=None, without=()):
+        self.arguments, self.target, self.without = arguments, target, without
+
+    def reset(self, template, folder):
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(template, folder)
+        for name in self.without:
+            with contextlib.suppress(FileNotFoundError):
+                os.remove(os.path.join(folder, name))
+
+    def state(self, folder):
+        """Of the file that the command writes: rows or bytes."""
+        path = os.path.join(folder, self.target)
+        if self.target.endswith(".db"):
+            return contents(path, folder + ".scratch")
+        if not os.path.exists(path):
+            return None
+        with open(path, "rb") as file:
+            return file.read()
+
+    def is_allowed(self, state, before, after, has_succeeded):
+        return state == after or (not has_succeeded and state == before)
+
+    def line(self, folder):
+        return [program.impactd(), *(argument.format(folder) for argument in self.arguments)]
+
+    def run(self, folder, environment):
+        """Exit code and what it said."""
+        done = subprocess.run(self.line(folder), env=environment, capture_output=True, text=True,
+                              timeout=TIMEOUT, check=False)
+        return done.returncode, done.stderr
+
+
+class Start(Case):
+    """The server: started, and stopped when it listens."""
+
+    def __init__(self, is_new):
+        super().__init__(*SERVE, target="data/impactd.db", without=("data/impactd.db",) if is_new else ())
+
+    def is_allowed(self, state, before, after, has_succeeded):
+        """Nothing is lost; jobs go on."""
+        if not before or not state:
+            return state == after or (not has_succeeded and not state)
+        lengths, wanted = count(state), count(before)
+        return all(lengths[table] >= wanted[table] for table in wanted)
+
+    def run(self, folder, environment):
+        with subprocess.Popen(self.line(folder), env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            try:
+                if process.stdout.readline():
+                    process.send_signal(signal.SIGTERM)
+                _, said = process.communicate(timeout=TIMEOUT)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
+        return process.returncode, said
+
+
+CASES = {
+    "new": Start(is_new=True),
+    "start": Start(is_new=False),
+    "backup": Case("backup", "{}/new.db", "--data", "{}/data", target="new.db"),
+    "backup over": Case("backup", "{}/copy.db", "--data", "{}/data", "--force", target="copy.db"),
+    "restore": Case("restore", "{}/copy.db", "--data", "{}/data", "--force", target="data/impactd.db"),
+    "check": Case("check-db", "--data", "{}/data", target="data/impactd.db"),
+    "import": Case("import", "{}/motion.AT2", "-o", "{}/motion.json", target="motion.json"),
+    "run": Case("run", "{}/scene.json", "-o", "{}/series.npy", target="series.npy"),
+}
+
+
+class Campaign:
+    """Every `stride`-th number of one command, from `first` on."""
+
+    def __init__(self, kind, stride=1, first=1):
+        self.kind, self.stride, self.first = kind, stride, first
+        self.calls, self.error = (ALLOCATIONS, 0) if kind == "allocations" else KINDS[kind]
+        self.tried, self.count, self.outcomes, self.wrong = 0, 0, collections.Counter(), []
+
+    def fault(self, what, text):
+        self.outcomes[what] += 1
+        self.wrong.append(text)
+        print(f"  {what}: {text[:600]}", flush=True)
+
+    def run(self, name):
+        root = tempfile.mkdtemp(prefix="impactd-")
+        self.case, self.folder, self.template = CASES[name], os.path.join(root, "work"), os.path.join(root, "template")
+        self.plain = dict(os.environ)
+        try:
+            os.mkdir(self.template)
+            prepare(self.template)
+            self.case.reset(self.template, self.folder)
+            before = self.case.state(self.folder)
+            control = Control(self.folder)
+            self.faulty = {**os.environ, **control.environment}
+            control.arm(0, self.calls, self.error)
+            code, said = self.case.run(self.folder, self.faulty)
+            self.count, _ = control.disarm()
+            assert code == 0, (name, code, said)
+            after = self.case.state(self.folder)
+            for permanent in (False, True):
+                for n in range(self.first, self.count + 1, self.stride):
+                    self.case.reset(self.template, self.folder)
+                    control.arm(n, self.calls, self.error, permanent)
+                    self.judge(f"{name}, {'from call' if permanent else 'call'} {n} of {self.count}", control, before, after)
+        finally:
+            shutil.rmtree(root, ignore_errors=True)
+
+    def judge(self, where, control, before, after):
+        self.tried += 1
+        try:
+            code, said = self.case.run(self.folder, self.faulty)
+        except subprocess.TimeoutExpired:
+            self.fault("hung", where)
+            return
+        finally:
+            control.disarm()
+        if code < 0 or "ERROR: " in said or "runtime error" in said:
+            self.fault("crashed", f"{where}: {code}: {said[-3000:]}")
+        elif code == 0:
+            self.outcomes["done"] += 1
+        elif code != 1 or not any(word in said for word in WORDS[self.kind]) or "is damaged, or" in said:
+            self.fault("unclear", f"{where}: {code}: {said}")
+        else:
+            self.outcomes["refused"] += 1
+        try:
+            state = self.case.state(self.folder)
+        except (AssertionError, sqlite3.Error) as reason:
+            self.fault("not whole", f"{where}: {reason}")
+            return
+        if not self.case.is_allowed(state, before, after, code == 0):
+            self.fault("partial", f"{where}: {code}: {said}: {count(state) if isinstance(state, dict) else state}")
+        code, said = self.case.run(self.folder, self.plain)
+        if code != 0 and not (state == after and "is there already" in said):
+            self.fault("then failed", f"{where}: {code}: {said}")
+
+
+def part(kind, stride, first, name):
+    """What a process does: the numbers of a command that are dealt to it."""
+    campaign = Campaign(kind, stride, first)
+    campaign.run(name)
+    return campaign
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--build", default=program.build)
+    parser.add_argument("--stride", type=int, default=1, help="each so many N")
+    parser.add_argument("--processes", type=int, default=4, help="commands at the same time")
+    parser.add_argument("kind", choices=["allocations", *KINDS])
+    parser.add_argument("names", nargs="*", default=list(CASES))
+    arguments = parser.parse_args()
+    program.build = os.path.abspath(arguments.build)
+    outcomes, began, has_faults = collections.Counter(), time.monotonic(), False
+    with concurrent.futures.ProcessPoolExecutor(arguments.processes) as pool:
+        stride = arguments.stride * arguments.processes
+        parts = {name: [pool.submit(part, arguments.kind, stride, first, name) for first in range(1, stride + 1, arguments.stride)]
+                 for name in arguments.names}
+        for name, all_of_it in parts.items():
+            done = [one.result() for one in all_of_it]
+            for one in done:
+                outcomes += one.outcomes
+                has_faults = has_faults or bool(one.wrong)
+            print(f"{name}: {done[0].count} calls, {sum(one.tried for one in done)} tried, after {time.monotonic() - began:.0f} s", flush=True)
+    print(f"{arguments.kind}: " + ", ".join(f"{number} {what}" for what, number in sorted(outcomes.items())))
+    return 1 if has_faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
