@@ -1,13 +1,13 @@
 // What the guide's pages do beyond HTML: the theme, copying code, the heading in sight, and the search.
 import { get } from "../web/js/api.js";
-import { themed } from "../web/js/theme.js";
+import { connectTheme } from "../web/js/theme.js";
 import { CopyButton, Notice } from "../web/js/ui/controls.js";
 import { html, render } from "../web/js/ui/preact.js";
 
-const MOST = 12; // results
+const MAX_RESULTS = 12; // results
 const EXCERPT = 130; // characters before and after a word
 const at = (id) => document.getElementById(id);
-themed(at("guide-theme"));
+connectTheme(at("guide-theme"));
 
 // Code: of a console only what is typed, without its prompts.
 function typed(code) {
@@ -207,7 +207,7 @@ async function search() {
     .map((section) => ({ section, points: score(section, wanted) }))
     .filter(({ points }) => points > 0)
     .sort((a, b) => b.points - a.points)
-    .slice(0, MOST);
+    .slice(0, MAX_RESULTS);
   render(
     html`${best.map(resultOf(wanted))}${best.length === 0 && html`<p>${nothing(sections)}</p>`}`,
     found,

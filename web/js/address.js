@@ -30,13 +30,13 @@ export function go(path, query) {
 }
 
 // To another page in place of this one: "back" does not come here again.
-export function swap(path, query) {
+export function replace(path, query) {
   history.replaceState(null, "", link(path, query));
   dispatchEvent(new HashChangeEvent("hashchange"));
 }
 
 // Changes parts of this page's query without showing it anew; null takes one out. With `push` "back" undoes it.
-export function note(changes, push = false) {
+export function setQuery(changes, push = false) {
   const { path, query } = read();
   const target = link(path.map(encodeURIComponent).join("/"), { ...query, ...changes });
   if (target !== location.hash) history[push ? "pushState" : "replaceState"](null, "", target);

@@ -10,14 +10,14 @@ class Refusal extends Error {
   }
 }
 
-const AWAY = {
+const NO_ANSWER = {
   title: "The server does not answer",
   detail: "Is it running? Nothing is lost here.",
 };
 
 // The reason of a failure: a module that could not be fetched means that the server did not answer.
 export const reason = (error) =>
-  error instanceof TypeError && /module/i.test(error.message) ? new Refusal(0, AWAY) : error;
+  error instanceof TypeError && /module/i.test(error.message) ? new Refusal(0, NO_ANSWER) : error;
 
 const KEY = "impactd.token";
 let signIn = null; // () -> a promise of whether there is a token now
@@ -50,18 +50,18 @@ async function send(method, path, { json, body, type, headers, query, signal }) 
     });
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Refusal(0, AWAY);
+    throw new Refusal(0, NO_ANSWER);
   }
 }
 
-let shown = null; // until this is aborted somebody reads the page that asks
-export function readUntil(signal) {
-  shown = signal;
+let pageSignal = null; // until this is aborted somebody reads the page that asks
+export function setPageSignal(signal) {
+  pageSignal = signal;
 }
 
 // One exchange; a Refusal where the answer is none. Options: json (a body), body and type (another one), headers, query
 // (null leaves one out), signal: once it is aborted there is no answer, but what writes is sent whole.
-export async function ask(method, path, { signal = shown, ...more } = {}) {
+export async function ask(method, path, { signal = pageSignal, ...more } = {}) {
   const options = { ...more, signal: method === "GET" ? signal : null };
   let response = await send(method, path, options);
   if (response.status === 401 && (await signIn?.())) response = await send(method, path, options);
@@ -73,17 +73,17 @@ export async function ask(method, path, { signal = shown, ...more } = {}) {
 const json = async (path, query, signal) => (await ask("GET", path, { query, signal })).json();
 
 // What is asked for while the modules of the page that will get() it are on their way.
-const early = new Map();
-export function askAhead(path) {
+const prefetched = new Map();
+export function prefetch(path) {
   const answer = json(path);
-  early.set(path, answer);
+  prefetched.set(path, answer);
   answer.catch(() => {}); // who gets it hears of it
 }
 
 // The answer's JSON.
 export function get(path, query, signal) {
-  const answer = query ? null : early.get(path);
-  if (answer) early.delete(path);
+  const answer = query ? null : prefetched.get(path);
+  if (answer) prefetched.delete(path);
   return answer ?? json(path, query, signal);
 }
 export const post = async (path, json, options) =>

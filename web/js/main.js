@@ -1,9 +1,9 @@
 // Which page is shown, and what stands around it: navigation, theme, units, token. Without Preact: what the page begins with
 // is asked for before that is here.
 import { read } from "./address.js";
-import { askAhead, get, onUnauthorised, readUntil, session, token } from "./api.js";
+import { prefetch, get, onUnauthorised, setPageSignal, session, token } from "./api.js";
 import { settings } from "./settings.js";
-import { themed } from "./theme.js";
+import { connectTheme } from "./theme.js";
 import { announce } from "./ui/announce.js";
 
 // A module's `page` is {title(address), show(host, address, signal) -> {change(address), redraw(), leave()}}: for a new query on
@@ -85,7 +85,7 @@ function element(name, className, text) {
 }
 
 async function open(address, signal, isNext) {
-  readUntil(signal);
+  setPageSignal(signal);
   if (isNext) main.replaceChildren("Loading …"); // what is left takes no clicks
   const [first = "scene"] = address.path;
   const section = first === "results" ? "jobs" : first;
@@ -99,7 +99,7 @@ async function open(address, signal, isNext) {
         title: "No such page",
         detail: `There is no page "${address.path.join("/")}" here. The links above lead to all pages.`,
       };
-    if (Object.hasOwn(FIRST, name)) askAhead(FIRST[name](address.path));
+    if (Object.hasOwn(FIRST, name)) prefetch(FIRST[name](address.path));
     const { page } = await pages[name]();
     if (signal.aborted) return null;
     const title = page.title(address);
@@ -128,7 +128,7 @@ async function open(address, signal, isNext) {
   }
 }
 
-themed(document.getElementById("theme"));
+connectTheme(document.getElementById("theme"));
 addEventListener("hashchange", show);
 show();
 settings.subscribe(async () => (await current.controller)?.redraw());

@@ -1,7 +1,7 @@
 // Light or dark: the system's until the reader chooses; also of the guide.
 const KEY = "impactd.theme";
 
-export function themed(button) {
+export function connectTheme(button) {
   const root = document.documentElement;
   const system = matchMedia("(prefers-color-scheme: dark)");
   const isDark = () => (root.dataset.theme ? root.dataset.theme === "dark" : system.matches);
@@ -10,7 +10,6 @@ export function themed(button) {
     button.hidden = false;
     button.ariaLabel = `Use ${isDark() ? "light" : "dark"} colours`;
     button.title = button.ariaLabel;
-    dispatchEvent(new Event("themechange")); // plots draw themselves anew
   }
   button.onclick = () => {
     set(isDark() ? "light" : "dark");

@@ -31,7 +31,7 @@ const GLYPH = 5.8; // px, a letter of an axis' texts
 export const textWidth = (text) => GLYPH * text.length;
 
 // A name in one line, or in two where it is wider than `room`.
-export function linesOf(text, room) {
+function linesOf(text, room) {
   if (textWidth(text) <= room) return [text];
   const middle = text.length / 2;
   const spaces = [...text.matchAll(/ /g)].map(({ index }) => index);

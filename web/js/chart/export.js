@@ -8,7 +8,7 @@ import { ink } from "./series.js";
 
 const HEAD = 34; // pixels above the plot: heading and legend
 const SVG = "http://www.w3.org/2000/svg";
-const MOST_ROWS = 1000;
+const MAX_ROWS = 1000;
 
 function element(name, attributes, text) {
   const node = document.createElementNS(SVG, name);
@@ -88,7 +88,7 @@ function rowsOf(series) {
   const rows = new Map();
   series.forEach((one, column) => {
     const values = one.low ? one.high : one.y;
-    for (let index = 0; index < one.x.length && rows.size < 20 * MOST_ROWS; index++) {
+    for (let index = 0; index < one.x.length && rows.size < 20 * MAX_ROWS; index++) {
       const x = one.x[index];
       if (!rows.has(x)) rows.set(x, []);
       rows.get(x)[column] ??= values[index];
@@ -110,10 +110,10 @@ export function DataTable({ title, series, x, y }) {
       .join("\n");
   const xText = (at) => (x.categories ? x.categories[at] : number(at, 6));
   const yText = (value) => (y.categories ? y.categories[value] : number(value, 6));
-  const isCut = rows.length > MOST_ROWS;
+  const isCut = rows.length > MAX_ROWS;
   return html`<div class="chart-data">
     <${CopyButton} text=${lines} label="Copy the table" />
-    ${isCut && html`<span>The first ${MOST_ROWS} of ${rows.length} rows; all of them are copied.</span>`}
+    ${isCut && html`<span>The first ${MAX_ROWS} of ${rows.length} rows; all of them are copied.</span>`}
     <div class="scroll" tabindex="0" role="region" aria-label=${`Numbers of ${title}`}>
       <table>
         <thead>
@@ -122,7 +122,7 @@ export function DataTable({ title, series, x, y }) {
           </tr>
         </thead>
         <tbody>
-          ${rows.slice(0, MOST_ROWS).map(
+          ${rows.slice(0, MAX_ROWS).map(
             ([at, cells]) =>
               html`<tr>
                 <th scope="row" class="number">${xText(at)}</th>

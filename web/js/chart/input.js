@@ -4,7 +4,7 @@ import { markerAt, placeText, valuesAt } from "./cursor.js";
 const SHORT = 5; // pixels: less is a click, not a drag
 
 // The part of x in view, `factor` times as wide about `center` and moved by `shift` of its width; never beyond the whole.
-export function turned({ whole, domain, xScale }, factor, center, shift = 0) {
+function turned({ whole, domain, xScale }, factor, center, shift = 0) {
   const [map, back] = xScale.isLog ? [Math.log10, (value) => 10 ** value] : [Number, Number];
   const [first, last] = whole.map(map);
   const [low, high] = domain.map(map);

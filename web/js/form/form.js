@@ -6,7 +6,7 @@ import { title, words } from "../units.js";
 import { parts, useDraft } from "./draft.js";
 import { ChoiceField, Field, TypedField } from "./fields.js";
 
-const MOST = 100; // items of a list that are drawn
+const MAX_ITEMS = 100; // items of a list that are drawn
 
 function uncover(element) {
   let box = element.closest("details");
@@ -200,13 +200,13 @@ function ListNode(context) {
     focused.current = null;
   });
   const notes = [
-    value.length > MOST && `${MOST} of ${value.length} are shown`,
+    value.length > MAX_ITEMS && `${MAX_ITEMS} of ${value.length} are shown`,
     ...draft.faults.filter((fault) => fault.pointer === pointer).map(faultText),
   ].filter(Boolean);
   const add = () => splice(value.length, 0, options.start?.(`${pointer}/N`) ?? {});
   return html`<${Group} ...${context}>
     <div ref=${box}>
-      ${value.slice(0, MOST).map(
+      ${value.slice(0, MAX_ITEMS).map(
         (_, at) =>
           html`<fieldset key=${keys.current.list[at]}>
             <legend>${`${one} ${at + 1}`}</legend>

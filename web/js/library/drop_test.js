@@ -10,7 +10,7 @@ import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { capital } from "../units.js";
 import { DropGrid } from "./drop_grid.js";
-import { path, readMaterial } from "./format.js";
+import { materialPath, readMaterial } from "./format.js";
 import { Readings } from "./readings.js";
 import { Fields, markFaults, Refusal, widgetOf, WriteForm } from "./schema_form.js";
 import { TraceField } from "./trace.js";
@@ -37,7 +37,7 @@ function useEvaluation(slug, draft, fields) {
     clearTimeout(timer.current);
     setResult((last) => ({ ...last, state: "Wait …" }));
     try {
-      const answer = await post(path(slug, "/measurements"), draft.scene, { query });
+      const answer = await post(materialPath(slug, "/measurements"), draft.scene, { query });
       if (mine === turn.current) onAnswer(answer);
       return true;
     } catch (error) {
@@ -131,7 +131,10 @@ function Proposal({ material, measurements, calibration }) {
             query: { material: material.slug },
             signal,
           })
-        : await ask("GET", path(material.slug, "/proposal"), { query: { measurements }, signal });
+        : await ask("GET", materialPath(material.slug, "/proposal"), {
+            query: { measurements },
+            signal,
+          });
       return { found: await answer.json(), etag: answer.headers.get("ETag") };
     },
     [material.slug, measurements, calibration],

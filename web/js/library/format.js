@@ -6,7 +6,7 @@ import { useLoaded } from "../ui/store.js";
 import { Table } from "../ui/table.js";
 import { number, pretty, quantity, scale, title } from "../units.js";
 
-export const path = (slug, rest = "") => `v1/materials/${encodeURIComponent(slug)}${rest}`;
+export const materialPath = (slug, rest = "") => `v1/materials/${encodeURIComponent(slug)}${rest}`;
 
 const TONES = { approved: "ok", draft: "warn", deprecated: "bad" };
 export const Badge = ({ status }) => html`<span class=${`badge ${TONES[status]}`}>${status}</span>`;
@@ -63,7 +63,7 @@ export const statusColumn = {
 // A material as it stands, with the entity tag that a change of it needs.
 export async function readMaterial(slug, revision, signal) {
   const part = revision ? `@${encodeURIComponent(revision)}` : "";
-  const answer = await ask("GET", path(slug, part), { signal });
+  const answer = await ask("GET", materialPath(slug, part), { signal });
   return { ...(await answer.json()), etag: answer.headers.get("ETag") };
 }
 
@@ -77,7 +77,7 @@ export function memberText(value, unit) {
 // What the second of two revisions has changed.
 export function Differences({ slug, first, second }) {
   const loaded = useLoaded(
-    (signal) => get(path(slug, "/diff"), { from: first, to: second }, signal),
+    (signal) => get(materialPath(slug, "/diff"), { from: first, to: second }, signal),
     [slug, first, second],
   );
   const columns = [

@@ -14,7 +14,7 @@ import {
   figureColumns,
   measured,
   memberText,
-  path,
+  materialPath,
   QUANTITIES,
   range,
   readMaterial,
@@ -30,7 +30,7 @@ const IN_HEADLINES =
 // {material, revisions, steps, used, tests, properties}
 async function load(slug, revision, signal) {
   const material = await readMaterial(slug, revision, signal);
-  const list = (part) => get(path(slug, part), { limit: 100 }, signal);
+  const list = (part) => get(materialPath(slug, part), { limit: 100 }, signal);
   const [{ revisions }, { history }, used, tests, { properties }] = await Promise.all([
     list("/revisions"),
     list("/history"),
@@ -123,7 +123,10 @@ function SpeedTable({ rows }) {
 
 // All tests of the material together, as a proposal would combine them.
 function DropTests({ slug, count }) {
-  const loaded = useLoaded((signal) => get(path(slug, "/proposal"), null, signal), [slug, count]);
+  const loaded = useLoaded(
+    (signal) => get(materialPath(slug, "/proposal"), null, signal),
+    [slug, count],
+  );
   return html`<${Panel} title="Drop tests" help="What was read">
     <${Loaded} loaded=${loaded}>${(found) => html`<${Readings} ...${found} />`}<//>
   <//>`;

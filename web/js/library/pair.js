@@ -1,5 +1,5 @@
 // The contact of a material between two masses: k_b and c_b with their uncertainty, where they hold, and the force of an impact.
-import { note, read } from "../address.js";
+import { setQuery, read } from "../address.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Loaded, Panel, sentence, withSubscripts } from "../ui/controls.js";
@@ -143,7 +143,7 @@ export function PairPanel({ material }) {
   const isValid = masses.damper_mass !== null && (other.trim() === "" || masses.structure_mass);
   const loaded = useLoaded(
     async (signal) => {
-      note({
+      setQuery({
         m: query.m || own !== String(impactor ?? DEFAULT_MASS) ? own : null,
         M: other,
         for: carried === "scene" ? null : carried,

@@ -1,5 +1,5 @@
 // One ground motion: its samples and its response spectrum, what is known of it, what uses it.
-import { go, link, note } from "../address.js";
+import { go, link, setQuery } from "../address.js";
 import { ask, get, save } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Button, Choice, Headlines, Loaded, Menu, Panel } from "../ui/controls.js";
@@ -54,7 +54,7 @@ function Samples({ record, query }) {
   const choose = (next) => {
     const rounded = next?.map((end) => Number(end.toPrecision(8))) ?? null;
     setRange(rounded);
-    note({ from: rounded?.[0], to: rounded?.[1] });
+    setQuery({ from: rounded?.[0], to: rounded?.[1] });
   };
   const summary =
     `${number(record.count, 9)} samples over ${quantity(duration, "s")}; ` +
@@ -111,7 +111,7 @@ function Spectrum({ name, query }) {
         value=${kind}
         onChange=${(value) => {
           setKind(value);
-          note({ spectrum: value });
+          setQuery({ spectrum: value });
         }}
       />
       <${Choice}
@@ -120,7 +120,7 @@ function Spectrum({ name, query }) {
         value=${ratio}
         onChange=${(value) => {
           setRatio(value);
-          note({ damping: value });
+          setQuery({ damping: value });
         }}
       />
     </div>

@@ -1,5 +1,5 @@
 // Forms by a schema that are sent as a whole, and those that change a material.
-import { swap } from "../address.js";
+import { replace } from "../address.js";
 import { post, schema as schemaNamed } from "../api.js";
 import { makeDraft, useNews } from "../form/draft.js";
 import { focusField, Form } from "../form/form.js";
@@ -8,7 +8,7 @@ import { Failure, faultText, Loaded, Notice } from "../ui/controls.js";
 import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { title } from "../units.js";
-import { Differences, path, readMaterial } from "./format.js";
+import { Differences, materialPath, readMaterial } from "./format.js";
 
 // A component as a widget of a form: drawn again with each of the draft's news.
 export const widgetOf = (Component) =>
@@ -102,8 +102,10 @@ export function WriteForm({ name, material, part, ...more }) {
   const send = async (json) => {
     const { slug, latest, etag } = seen.current;
     try {
-      const { revision } = await post(path(slug, part), json, { headers: { "If-Match": etag } });
-      swap(`materials/${slug}`, { revision });
+      const { revision } = await post(materialPath(slug, part), json, {
+        headers: { "If-Match": etag },
+      });
+      replace(`materials/${slug}`, { revision });
       return null;
     } catch (error) {
       if (error.status !== 412) throw error;

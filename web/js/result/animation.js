@@ -22,7 +22,7 @@ const NOTE = 500; // ms between changes of the address while it plays
 const CALM = 250; // ms between frames for readers who prefer reduced motion
 const HEIGHT = 230; // pixels of the drawing of several storeys
 
-export const isCalm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+const isCalm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 function paceText(pace) {
   return pace > 1 ? `1/${pace} ×` : `${Math.round(1 / pace)} ×`;
@@ -77,7 +77,7 @@ function useWindow({ result, query, shown }) {
   return { from: range[0], to: range[1], end: whole.end };
 }
 
-// The instant: {t, isPlaying, seek(t), play(on), note()}. What changes the address elsewhere moves it.
+// The instant: {t, isPlaying, play(on), scrub(t), writeInstant() to the address, step(side)}. A change of the address moves it.
 function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, isReady, onFrame) {
   const [t, setT] = useState(window.from);
   const [isPlaying, setPlaying] = useState(false);
@@ -98,7 +98,7 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
     now.current = Number(limit(Number(wanted) || 0, from, to).toPrecision(12)); // digits for the address
     setT(now.current);
   };
-  const note = () => {
+  const writeInstant = () => {
     noted.current = now.current;
     change({ t: now.current });
   };
@@ -127,7 +127,7 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
         if (pending.current !== query.impact || signal.aborted) return;
         pending.current = null;
         seek(row?.start ?? latest.current.window.from);
-        if (followed.current.t !== undefined) note();
+        if (followed.current.t !== undefined) writeInstant();
       });
   }, [query.t, query.impact, window.from, window.to]);
 
@@ -150,13 +150,13 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
       else {
         seek(to);
         setIsPlaying(false);
-        note();
+        writeInstant();
         return;
       }
       onFrame(now.current);
       if (time - written > NOTE) {
         written = time;
-        note();
+        writeInstant();
       }
     };
     frame = requestAnimationFrame(step);
@@ -169,7 +169,7 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
   const play = (on) => {
     if (on && now.current >= Number(window.to.toPrecision(12))) seek(window.from);
     setIsPlaying(on);
-    if (!on) note();
+    if (!on) writeInstant();
   };
   const scrub = (wanted) => {
     pending.current = null;
@@ -193,7 +193,7 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
       change({ impact: row.number, t: row.start, ...all }, true);
     });
   };
-  return { t, isPlaying, play, scrub, note, step };
+  return { t, isPlaying, play, scrub, writeInstant, step };
 }
 
 // The number of the contact that begins next after t, or last before it.
@@ -284,7 +284,7 @@ export function Animation() {
           step=${(window.to - window.from) / 1000}
           value=${t}
           onInput=${(event) => player.scrub(event.currentTarget.value)}
-          onChange=${player.note}
+          onChange=${player.writeInstant}
         />
         <${FilmTools}
           scene=${{ model, stroke, peak, hasTrail }}

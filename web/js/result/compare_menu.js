@@ -5,7 +5,7 @@ import { Button, Failure, Loaded, Menu } from "../ui/controls.js";
 import { html, useState } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 
-const MOST_MATERIALS = 30;
+const MAX_MATERIALS = 30;
 
 const plain = ({ study, title, labels, ...scene }) => scene;
 const usedBy = (scene) =>
@@ -34,7 +34,7 @@ function choicesOf(scene, plan, materials) {
         ({ slug, restitution, status }) =>
           restitution !== null && status !== "deprecated" && !used.includes(slug),
       )
-      .slice(0, MOST_MATERIALS)
+      .slice(0, MAX_MATERIALS)
       .map(({ slug, name }) => ({ label: name, change: withMaterial(slug) })),
     { label: "No damper", change: (whole) => ({ ...whole, dampers: [] }) },
     {

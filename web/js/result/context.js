@@ -1,5 +1,5 @@
 // What all parts of a result's page share: the result, its impacts, the view that the address holds, and how to change it.
-import { note, read } from "../address.js";
+import { setQuery, read } from "../address.js";
 import { get } from "../api.js";
 import { createContext, useContext, useMemo, useState } from "../ui/preact.js";
 import { createStore } from "../ui/store.js";
@@ -22,7 +22,7 @@ export function useResultContext(result, signal, jobs) {
     return { ledger: new Ledger({ path, result }), shown: createStore(null) };
   }, [result.id]);
   const change = (changes, push = false) => {
-    note(changes, push);
+    setQuery(changes, push);
     redraw((count) => count + 1);
   };
   return { result, path, query: read().query, change, signal, jobs, ...kept };

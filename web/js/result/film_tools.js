@@ -1,6 +1,6 @@
 // The animation to take along: the frame as PNG, the window as a film, whose progress is shown and which can be cancelled.
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
-import { LONGEST, canRecord, saveFilm, saveFrame } from "../scene/film.js";
+import { MAX_SECONDS, canRecord, saveFilm, saveFrame } from "../scene/film.js";
 import { announce } from "../ui/announce.js";
 import { Failure, IconButton } from "../ui/controls.js";
 import { number } from "../units.js";
@@ -24,8 +24,8 @@ export function FilmTools({ scene, frame, frameAt, window, t, pace, signal }) {
   };
   // The window in view, or as much from the instant on as a film may have.
   const whole = (window.to - window.from) * pace;
-  const start = whole > LONGEST ? Math.min(t, window.to - LONGEST / pace) : window.from;
-  const seconds = Math.min(LONGEST, whole);
+  const start = whole > MAX_SECONDS ? Math.min(t, window.to - MAX_SECONDS / pace) : window.from;
+  const seconds = Math.min(MAX_SECONDS, whole);
   const film = async () => {
     stop.current = new AbortController();
     began.current = performance.now();

@@ -24,7 +24,7 @@ function placeOf(row, { scene }) {
 }
 
 // The impact that the address names, else the hardest one in view.
-export function useImpact() {
+function useImpact() {
   const { result, query, ledger, path } = useResult();
   const { from, to } = windowOf(result, query);
   return useLoaded(

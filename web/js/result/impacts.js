@@ -6,7 +6,7 @@ import { Table } from "../ui/table.js";
 import { number } from "../units.js";
 import { useResult, windowOf } from "./context.js";
 
-const MOST = 500; // rows: some 50 kB as transferred
+const MAX_ROWS = 500; // rows: some 50 kB as transferred
 
 const placeOf = ({ damper, side, kind }) =>
   `${damper}, ${side}${kind === "resting" ? ", resting" : ""}`;
@@ -14,7 +14,7 @@ const placeOf = ({ damper, side, kind }) =>
 export function ImpactTable() {
   const { result, query, ledger, change } = useResult();
   const { from, to } = windowOf(result, query);
-  const loaded = useLoaded(() => ledger.window(from, to, MOST), [result.id, from, to]);
+  const loaded = useLoaded(() => ledger.window(from, to, MAX_ROWS), [result.id, from, to]);
   const open = ({ number: nth }) => change({ impact: nth }, true);
   const columns = [
     {
@@ -45,7 +45,7 @@ export function ImpactTable() {
     return html`<p>No impact is listed; there were ${number(result.summary.impacts)}.</p>`;
   return html`<${Loaded} loaded=${loaded}>
     ${({ impacts, count }) => {
-      const cut = count > impacts.length ? `, here the first ${MOST}` : "";
+      const cut = count > impacts.length ? `, here the first ${MAX_ROWS}` : "";
       const caption = `${number(count)} in this window of time${cut}`;
       return html`<p class="hint">${caption}</p>
         <${Table}

@@ -12,7 +12,7 @@ import { useResult, windowOf } from "./context.js";
 import { readMeasured, VALUE_UNITS } from "./measured_file.js";
 import { quantityColor } from "./motion.js";
 
-const MOST_SAMPLES = 2e6;
+const MAX_SAMPLES = 2e6;
 const AUDIBLE = 1e-3; // of the loudest third octave: quieter ones are not put into words
 const PAUSE = 200; // ms that a shift stands before it is sent
 const QUANTITIES = { m: "displacement", "m/s": "velocity", "m/s^2": "acceleration", N: "force" };
@@ -79,7 +79,7 @@ function Measured({ file }) {
     const factor = VALUE_UNITS[unit]?.[1] ?? 1;
     return { start: file.start, interval, values: file.values.map((value) => value * factor) };
   }, [file, unit, interval]);
-  const isShown = channel && result.count <= MOST_SAMPLES;
+  const isShown = channel && result.count <= MAX_SAMPLES;
   const series = useLoaded(
     (signal) => (isShown ? loadChannel(path, channel, signal) : null),
     [result.id, channel],
@@ -102,7 +102,7 @@ function Measured({ file }) {
   if (!channel) return html`<p>${`The result has no channel in ${pretty(file.unit)}.`}</p>`;
   if (!isShown)
     return html`<p>
-      ${`The result has ${number(result.count)} samples; up to ${number(MOST_SAMPLES)} are compared here.`}
+      ${`The result has ${number(result.count)} samples; up to ${number(MAX_SAMPLES)} are compared here.`}
     </p>`;
   return html`<div class="row level measured-row">
       <span

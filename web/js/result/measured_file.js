@@ -2,8 +2,8 @@
 import { numberRows } from "../ui/number_rows.js";
 import { number, words } from "../units.js";
 
-const LEAST = 16; // samples that the service compares
-const LARGEST = 1e100; // whose square is a number
+const MIN_SAMPLES = 16; // samples that the service compares
+const MAX_VALUE = 1e100; // whose square is a number
 const TIME_UNITS = { s: 1, ms: 1e-3, µs: 1e-6, us: 1e-6, min: 60 };
 // What a measured value may be in: the SI unit of each and its factor.
 export const VALUE_UNITS = {
@@ -55,7 +55,7 @@ function checkRows(rows, columns) {
       throw new Error(
         `Line ${line}: "${cells[at].slice(0, 40)}" is not a number; ${example(hasTime)}.`,
       );
-    const huge = numbers.findIndex((value) => Math.abs(value) > LARGEST);
+    const huge = numbers.findIndex((value) => Math.abs(value) > MAX_VALUE);
     if (huge >= 0)
       throw new Error(
         `Line ${line}: ${cells[huge].slice(0, 40)} is too large for a measured value; ${example(hasTime)}.`,
@@ -85,9 +85,9 @@ function stepsOf(rows) {
 // where its headings do not state one of VALUE_UNITS. An Error names the line and what would be right there.
 export function readMeasured(text, name, channels) {
   const { heads, rows } = numberRows(text);
-  if (rows.length < LEAST)
+  if (rows.length < MIN_SAMPLES)
     throw new Error(
-      `${name} has ${rows.length} lines of numbers; at least ${LEAST} would be right, each with a value, or a time and a value.`,
+      `${name} has ${rows.length} lines of numbers; at least ${MIN_SAMPLES} would be right, each with a value, or a time and a value.`,
     );
   const columns = rows[0].cells.length;
   checkRows(rows, columns);

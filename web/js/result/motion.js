@@ -11,8 +11,8 @@ import { useBare } from "./bare.js";
 import { channelNames, useResult, windowOf } from "./context.js";
 import { isWhole, seriesOf, timeOfEnergy, useSeries } from "./series.js";
 
-const MOST_MARKERS = 300;
-const MOST_LINES = 4; // of one chart
+const MAX_MARKERS = 300;
+const MAX_LINES = 4; // of one chart
 const QUIET_PART = 0.7; // where the motion dies before this part of the run, only that much is shown at first
 
 // One colour for each quantity, from the drawing to the legend: variables of style.css.
@@ -116,7 +116,7 @@ const buffers = ({ clearance, offset }) =>
 // Of many storeys the lowest, the middle and the highest.
 function picked(channels) {
   const last = channels.length - 1;
-  return last < MOST_LINES
+  return last < MAX_LINES
     ? channels
     : [channels[0], channels[Math.round(last / 2)], channels[last]];
 }
@@ -167,7 +167,7 @@ export function Motion({ onDrawn }) {
     channels.findLast((channel) => wordOf(channel) === "displacement") ?? "displacement",
   );
   const impacts = useLoaded(
-    () => ledger.window(window.from, window.to, MOST_MARKERS),
+    () => ledger.window(window.from, window.to, MAX_MARKERS),
     [result.id, window.from, window.to],
   );
 
@@ -228,7 +228,7 @@ export function Motion({ onDrawn }) {
     charts.length === 0 && "The scene asked for no channels.",
     isEnvelope &&
       `Each pixel shows the least and the largest of ${number(loaded.data.bucket)} samples.`,
-    isCut && `${number(impacts.data.count)} contacts: zoom to ${MOST_MARKERS} to see them marked.`,
+    isCut && `${number(impacts.data.count)} contacts: zoom to ${MAX_MARKERS} to see them marked.`,
   ]
     .filter(Boolean)
     .join(" ");

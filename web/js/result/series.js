@@ -3,17 +3,17 @@
 import { ask, get } from "../api.js";
 import { useLoaded } from "../ui/store.js";
 
-export const MOST_SAMPLES = 50000;
+export const MAX_SAMPLES = 50000;
 
 // Few enough samples to load all of them, whatever the window.
-export const isWhole = ({ count }) => count <= MOST_SAMPLES;
+export const isWhole = ({ count }) => count <= MAX_SAMPLES;
 
 // {time, columns: Map of channel to {values} or {low, high}, isEnvelope, bucket} of these channels.
 export async function loadSeries({ path, result, channels, window, pixels, signal }) {
   const { sample_rate: rate } = result;
   const names = channels.join();
   const inWindow = (window.to - window.from) * rate;
-  if (inWindow <= MOST_SAMPLES) {
+  if (inWindow <= MAX_SAMPLES) {
     const query = isWhole(result)
       ? { channels: names }
       : { channels: names, from: window.from, to: window.to };

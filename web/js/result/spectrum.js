@@ -5,11 +5,11 @@ import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Loaded } from "../ui/controls.js";
 import { useLoaded } from "../ui/store.js";
-import { latest } from "../runs/names.js";
+import { latestResults } from "../runs/names.js";
 import { number, pretty, words } from "../units.js";
 import { useResult } from "./context.js";
 
-const MOST_OVERLAYS = 7; // there are 8 colours
+const MAX_OVERLAYS = 7; // there are 8 colours
 
 const NO_NAMES = new Map();
 const NONE = [];
@@ -17,7 +17,7 @@ const NONE = [];
 const load = (id) => get(`v1/results/${encodeURIComponent(id)}/psd.json`);
 
 // The mean of each value's third octave: from 2^(-1/6) to 2^(1/6) of its frequency.
-export function thirdOctaves(frequencies, values) {
+function thirdOctaves(frequencies, values) {
   const sums = [0];
   for (const value of values) sums.push(sums[sums.length - 1] + value);
   const ratio = 2 ** (1 / 6);
@@ -43,10 +43,10 @@ function peakOf({ x, y }, range) {
 
 export function Spectrum() {
   const { result, query } = useResult();
-  const ids = (query.overlay ?? "").split(",").filter(Boolean).slice(0, MOST_OVERLAYS);
+  const ids = (query.overlay ?? "").split(",").filter(Boolean).slice(0, MAX_OVERLAYS);
   const hasPsd = Boolean(result.links.psd);
   const own = useLoaded(async () => (hasPsd ? load(result.id) : null), [result.id]);
-  const names = useLoaded(() => latest(20), [result.id]);
+  const names = useLoaded(() => latestResults(20), [result.id]);
   const others = useLoaded(
     () => Promise.all(ids.map((id) => load(id).catch(() => null))),
     [ids.join()],

@@ -6,7 +6,7 @@ import { Button } from "../ui/controls.js";
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
 import { number } from "../units.js";
 
-const MOST_COMPARED = 4;
+const MAX_COMPARED = 4;
 const LETTERS = ["a", "b", "c", "d"];
 
 const count = (number) => (number === 1 ? "1 run" : `${number} runs`);
@@ -14,17 +14,17 @@ const resultsOf = (rows) => [
   ...new Set(rows.filter((row) => row.result && !row.result_deleted).map((row) => row.result)),
 ];
 
-export const comparisonLink = (results) =>
+const comparisonLink = (results) =>
   link("compare", Object.fromEntries(results.map((id, at) => [LETTERS[at], id])));
 
 function CompareLink({ rows }) {
   const results = resultsOf(rows);
-  if (results.length >= 2 && results.length <= MOST_COMPARED)
+  if (results.length >= 2 && results.length <= MAX_COMPARED)
     return html`<a class="button primary" href=${comparisonLink(results.reverse())}>Compare</a>`;
   return html`<button
     type="button"
     disabled
-    title=${`Choose 2 to ${MOST_COMPARED} runs with results`}
+    title=${`Choose 2 to ${MAX_COMPARED} runs with results`}
   >
     Compare
   </button>`;

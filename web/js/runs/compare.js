@@ -1,5 +1,5 @@
 // Up to four results beside each other. In the address: a to d (results), and what comparison.js keeps there.
-import { go, link, note, read, swap } from "../address.js";
+import { go, link, setQuery, read, replace } from "../address.js";
 import { follow, get, schema as schemaNamed, submit } from "../api.js";
 import { Button, Failure, Help, IconButton, Loaded } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
@@ -7,7 +7,7 @@ import { html, useEffect, useReducer, useRef } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
 import { brief } from "../units.js";
 import { Comparison } from "./comparison.js";
-import { differingNames, isSame, latest } from "./names.js";
+import { differingNames, isSame, latestResults } from "./names.js";
 import { inputsOf } from "../scene/inputs.js";
 import { materialOf, valueText } from "./scene_name.js";
 
@@ -79,19 +79,19 @@ function ComparePage({ address }) {
   const [, redraw] = useReducer((count) => count + 1, 0);
   const { query } = read();
   const ids = idsOf(query);
-  const known = useLoaded(() => latest(LATEST), [ids.join()]);
+  const known = useLoaded(() => latestResults(LATEST), [ids.join()]);
   const loaded = useLoaded(
     (signal) => (ids.length > 1 ? loadComparison(ids, signal) : { runs: [] }),
     [ids.join()],
   );
   const change = (changes, push) => {
-    note(changes, push);
+    setQuery(changes, push);
     redraw();
   };
   // Without any named the last two are compared.
   useEffect(() => {
     const [b, a] = known.data?.keys() ?? [];
-    if (a && idsOf(read().query).length === 0) swap("compare", { a, b });
+    if (a && idsOf(read().query).length === 0) replace("compare", { a, b });
   }, [known.data, address]);
   const isCurrent = !loaded.isLoading && loaded.data?.runs.length === ids.length;
   const labels = isCurrent ? loaded.data.runs.map(({ label }) => label) : [];
@@ -117,10 +117,10 @@ function ComparePage({ address }) {
 
 export const page = pageOf(() => "Compare", ComparePage);
 
-export const LETTERS = [..."abcd"];
-export const idsOf = (query) => LETTERS.map((letter) => query[letter]).filter(Boolean);
+const LETTERS = [..."abcd"];
+const idsOf = (query) => LETTERS.map((letter) => query[letter]).filter(Boolean);
 // The address' query of these results.
-export const lettered = (ids) =>
+const lettered = (ids) =>
   Object.fromEntries(LETTERS.map((letter, at) => [letter, ids[at] ?? null]));
 
 async function loadRun(id, signal) {
@@ -145,7 +145,7 @@ async function loadRun(id, signal) {
 }
 
 // {runs, pairs, inputs}: `pairs` are the others against the first, as the service compares them; `inputs` those that differ.
-export async function loadComparison(ids, signal) {
+async function loadComparison(ids, signal) {
   const [schema, ...runs] = await Promise.all([
     schemaNamed("scene"),
     ...ids.map((id) => loadRun(id, signal)),

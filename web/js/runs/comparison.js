@@ -7,7 +7,7 @@ import { useLoaded } from "../ui/store.js";
 import {
   isWhole,
   loadSeries,
-  MOST_SAMPLES,
+  MAX_SAMPLES,
   seriesOf,
   timeOfEnergy,
   differenceOf,
@@ -205,7 +205,7 @@ function Motions({ runs, pairs, query, change }) {
             differences.length === 0 &&
             !isAllSame &&
             html`<p class="hint">
-              ${`With more than ${number(MOST_SAMPLES)} samples only their range is drawn: zoom in to see the difference.`}
+              ${`With more than ${number(MAX_SAMPLES)} samples only their range is drawn: zoom in to see the difference.`}
             </p>`
           }
           ${isFirst && isAllSame && html`<p class="hint">The motions differ by rounding at most.</p>`}`

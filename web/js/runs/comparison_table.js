@@ -8,7 +8,7 @@ import { number, pretty, quantity, title } from "../units.js";
 import { isSame } from "./names.js";
 
 // "70.2 ×", "+4.2 %"; "" where that says nothing.
-export function changeText(value, first) {
+function changeText(value, first) {
   const ratio = value / first;
   if (ratio < 0) return ""; // across zero a ratio says nothing
   if (typeof value !== "number" || !Number.isFinite(ratio) || Math.abs(ratio - 1) < 1e-9) return "";

@@ -4,7 +4,7 @@ import { capital, moment, pretty, words } from "../units.js";
 import { materialOf, valueText } from "./scene_name.js";
 import { unitAt, valuesOf } from "../scene/inputs.js";
 
-const MOST_PARTS = 3; // of a name
+const MAX_PARTS = 3; // of a name
 
 // "clearance 15 mm"; words speak for themselves: "sponge".
 const partText = ({ label, unit }, value) =>
@@ -29,7 +29,7 @@ const usualValue = (values) =>
 
 // A name for each of {scene, title}: by the inputs that vary among them, else by what they are. Without a title the material
 // comes first; below a title stands only what is unusual among them.
-export function differingNames(jobs, schema, mostParts = MOST_PARTS, isBelowTitle = false) {
+export function differingNames(jobs, schema, mostParts = MAX_PARTS, isBelowTitle = false) {
   const scenes = jobs.map(({ scene }) => scene ?? {});
   const inputs = varyingInputs(scenes, schema);
   const usual = inputs.map(({ values }) => (isBelowTitle ? usualValue(values) : undefined));
@@ -57,7 +57,7 @@ export function namesOf(jobs, schema) {
   const groups = Map.groupBy(jobs, ({ title }) => pretty(title));
   for (const [title, group] of groups) {
     const isAlone = title !== "" && new Set(group.map(({ result, id }) => result ?? id)).size === 1;
-    const found = isAlone ? [] : differingNames(group, schema, MOST_PARTS, title !== "");
+    const found = isAlone ? [] : differingNames(group, schema, MAX_PARTS, title !== "");
     const isTelling = new Set(found).size > 1;
     group.forEach((job, at) => {
       const own = found[at] ?? `A ${job.study ?? "run"} without a title`;
@@ -71,7 +71,7 @@ export function namesOf(jobs, schema) {
 }
 
 // The latest results by their ids: a name that tells each from the others, and when it ended.
-export async function latest(limit) {
+export async function latestResults(limit) {
   const query = { status: "successful", kind: "none", limit, details: 1 };
   const [{ jobs }, schema] = await Promise.all([get("v1/jobs", query), schemaNamed("scene")]);
   const there = jobs.filter((job) => job.result && !job.result_deleted);

@@ -1,5 +1,5 @@
 // One run while it goes on: how far it is, how to stop it, why it failed. What came out is the result's page.
-import { link, note, read, swap } from "../address.js";
+import { link, setQuery, read, replace } from "../address.js";
 import { follow, get, remove } from "../api.js";
 import { announce } from "../ui/announce.js";
 import { Button, Failure, Loaded, Notice } from "../ui/controls.js";
@@ -25,7 +25,7 @@ function stateText({ status, progress, timing: { run } }) {
 function SweepRows({ job, path }) {
   const [, redraw] = useReducer((count) => count + 1, 0);
   const change = (changes, push) => {
-    note(changes, push);
+    setQuery(changes, push);
     redraw();
   };
   if (job.study !== "sweep" || !(job.progress > 5)) return null; // before, its scene alone runs
@@ -52,7 +52,7 @@ function Run({ first, path, signal }) {
   }, []);
   const isDone = job.status === "successful" && !job.result_deleted;
   useEffect(() => {
-    if (isDone) swap(`results/${job.result}`);
+    if (isDone) replace(`results/${job.result}`);
   }, [isDone]);
   const cancel = async () => {
     setJob(await remove(path));

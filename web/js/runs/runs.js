@@ -1,6 +1,6 @@
 // The runs, newest first: their inputs where these vary, their metrics, what became of each. In the address: q (words), status,
 // kind (of study), sort ("-impacts" downwards), before (a page of older ones).
-import { link, note, read } from "../address.js";
+import { link, setQuery, read } from "../address.js";
 import { ask, remove, schema as schemaNamed } from "../api.js";
 import { announce } from "../ui/announce.js";
 import { Button, Help, Loaded } from "../ui/controls.js";
@@ -14,7 +14,7 @@ import { namesOf, varyingInputs } from "./names.js";
 import { valueText } from "./scene_name.js";
 
 const LIMIT = 100;
-const MOST_INPUTS = 3; // columns of them
+const MAX_INPUTS = 3; // columns of them
 const AGAIN_MS = 1500; // between looks at what goes on
 const KINDS = [
   "none",
@@ -78,7 +78,7 @@ function useProgress(loaded, query, reload) {
   });
 }
 
-export const targetOf = (job) =>
+const targetOf = (job) =>
   job.result && !job.result_deleted ? `results/${job.result}` : `jobs/${job.id}`;
 
 // Of inputs that vary among all rows, and what the shown ones have of the rest.
@@ -93,7 +93,7 @@ function columnsOf(rows, shown, schema, onCancel) {
   const at = new Map(withScene.map(({ id }, index) => [id, index]));
   const inputs = all
     .filter(isCommon)
-    .slice(0, MOST_INPUTS)
+    .slice(0, MAX_INPUTS)
     .map(({ pointer, label, unit, values }) => {
       const of = (row) => values[at.get(row.id)] ?? null;
       const isNumeric = values.every((value) => typeof (value ?? 0) === "number");
@@ -241,7 +241,7 @@ function RunsPage() {
   );
   const jobs = useProgress(loaded, { status, kind, before }, reload);
   const change = (changes) => {
-    note(changes);
+    setQuery(changes);
     redraw();
   };
   const toggle = (row) =>

@@ -3,7 +3,7 @@ import { get } from "../api.js";
 import { useDraft, useNews } from "../form/draft.js";
 import { ChoiceField } from "../form/fields.js";
 import { Form } from "../form/form.js";
-import { figure, path, range } from "../library/format.js";
+import { figure, materialPath, range } from "../library/format.js";
 import { Failure, withSubscripts } from "../ui/controls.js";
 import { html, useMemo, useRef } from "../ui/preact.js";
 import { useLoaded } from "../ui/store.js";
@@ -48,7 +48,10 @@ function BufferFields({ pointer, label, schema, draft, stop }) {
   const revisions = useLoaded(
     async (signal) =>
       hasRevisions
-        ? { slug, list: (await get(path(slug, "/revisions"), { limit: 100 }, signal)).revisions }
+        ? {
+            slug,
+            list: (await get(materialPath(slug, "/revisions"), { limit: 100 }, signal)).revisions,
+          }
         : null,
     [slug, hasRevisions],
   );

@@ -278,7 +278,7 @@ function Line({ points, name }) {
 }
 
 // `trail` is {span, states: [{age, displacements, positions}]}, the newest first.
-export function Trail({ trail, model, layout }) {
+function Trail({ trail, model, layout }) {
   const { span, states } = trail;
   const { top, middle, scale, trail: height } = layout;
   const highest = model.storeys[0].index;

@@ -6,7 +6,7 @@ import { layoutOf } from "./layout.js";
 
 const WIDTH = 640;
 const TRAIL = 60; // pixels
-export const LONGEST = 30; // s of a film
+export const MAX_SECONDS = 30; // s of a film
 
 // A place outside of the window where frames are drawn: {svg(), draw(state, trail), remove()}.
 function makeStage({ model, stroke, peak, hasTrail }) {
@@ -115,7 +115,7 @@ function stageFor(svg, host) {
 }
 
 // The frame as it is, as a PNG.
-export async function framePng(svg, text) {
+async function framePng(svg, text) {
   const { canvas, paint: draw } = stageFor(svg, svg.parentElement);
   await draw(text);
   return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
@@ -123,7 +123,7 @@ export async function framePng(svg, text) {
 
 // Records `seconds` of film: pose(second) puts the drawing there and returns the line of text, or null while it waits for
 // data. The film as a blob; null once the signal has ended it.
-export async function record({ svg, seconds, pose, onProgress, signal }) {
+async function record({ svg, seconds, pose, onProgress, signal }) {
   const { canvas, paint: draw } = stageFor(svg(), svg().parentElement);
   const track = canvas.captureStream(RATE);
   const recorder = new MediaRecorder(track, { mimeType: typeHere(), videoBitsPerSecond: 6e6 });

@@ -4,7 +4,7 @@ import { readNpy } from "../result/series.js";
 import { limit } from "./model.js";
 
 const PIECE = 6000; // numbers, few so that the first piece comes soon
-const MOST_PIECES = 8; // kept
+const MAX_PIECES = 8; // kept
 const PAUSE = 3000; // ms between two tries
 
 // `channels` are names; at(t) is null while the piece is on its way, then (name) -> value at t; `onPiece()` is called when one
@@ -23,7 +23,7 @@ export function makeFrames({ path, rate, channels, end, signal, onPiece, onFailu
       const [time, ...columns] = readNpy(await response.arrayBuffer());
       pieces.set(number, { start: time[0], columns });
       for (const old of pieces.keys()) {
-        if (pieces.size <= MOST_PIECES) break;
+        if (pieces.size <= MAX_PIECES) break;
         if (pieces.get(old) && Math.abs(old - number) > 2) pieces.delete(old);
       }
       onPiece();

@@ -2,7 +2,7 @@
 import { html, useRef, useState } from "../ui/preact.js";
 import { number, quantity } from "../units.js";
 import { Picture, endsOf } from "./drawing.js";
-import { MOST_DAMPERS, MOST_STOREYS, limit, modelOf } from "./model.js";
+import { MAX_DAMPERS, MAX_STOREYS, limit, modelOf } from "./model.js";
 import { px } from "./parts.js";
 import { useNews } from "../form/draft.js";
 import { useWidth } from "../ui/width.js";
@@ -159,7 +159,7 @@ function handlesOf(draft, model, layout) {
 }
 
 // `edit` is {draft, history, onDrag(isDragging)}.
-export function Handles({ edit, model, layout }) {
+function Handles({ edit, model, layout }) {
   const { draft, history, onDrag } = edit;
   const drag = useRef(null); // {name, start, x, y, ratio}
   const handles = handlesOf(draft, model, layout);
@@ -240,7 +240,7 @@ export function SceneDrawing({ draft, history }) {
   const layout = width > 0 && layoutOf(model, { width, fixed });
   const onDrag = (isDragging) => setFixed(isDragging ? layout.scale : null);
   const cut = model.isCut
-    ? ` At most ${MOST_STOREYS} storeys and ${MOST_DAMPERS} dampers are drawn.`
+    ? ` At most ${MAX_STOREYS} storeys and ${MAX_DAMPERS} dampers are drawn.`
     : "";
   return html`<div class="drawing" ref=${box}>
     ${

@@ -12,7 +12,7 @@ export const place = (pointer) =>
 
 export const isObject = (value) =>
   typeof value === "object" && value !== null && !Array.isArray(value);
-const LONGEST = 12; // values of a list that are written out
+const MAX_LISTED = 12; // values of a list that are written out
 
 // The schemas that could describe a value: those of alternatives too.
 const alternatives = (schema) => [
@@ -38,8 +38,8 @@ export function unitAt(schema, pointer) {
 function textOf(value) {
   if (value === null || value.length === 0) return "none";
   if (Array.isArray(value)) {
-    const rest = value.length - LONGEST;
-    const text = value.slice(0, LONGEST).map(textOf).join(", ");
+    const rest = value.length - MAX_LISTED;
+    const text = value.slice(0, MAX_LISTED).map(textOf).join(", ");
     return rest > 0 ? `${text}, and ${rest} more` : text;
   }
   if (isObject(value)) return JSON.stringify(value).slice(0, 120);

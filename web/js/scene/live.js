@@ -9,7 +9,7 @@ import { bareScene, isTooLong, makePreview, previewScene, samplesOf, tooLong } f
 
 const SPAN = 5; // a slider goes from a fifth of the value to five times it
 const STEPS = 400;
-const MOST_BUCKET = 0.03; // cycles of the first mode
+const MAX_BUCKET = 0.03; // cycles of the first mode
 const POINTS = [1200, 3000]; // of a preview: as few as show the free mass between its stops
 
 // The sliders of a scene: {label, pointer, unit, most}.
@@ -77,7 +77,7 @@ function Slider({ slider, draft }) {
 // The free mass as the structure sees it, from the middles of buckets; null where these are too long for that.
 function relativeOf({ series, plan }, [carrier, own]) {
   const { bucket = 1, sample_rate: rate } = series;
-  if ((bucket / rate) * (plan.modes[0]?.frequency ?? 0) > MOST_BUCKET) return null;
+  if ((bucket / rate) * (plan.modes[0]?.frequency ?? 0) > MAX_BUCKET) return null;
   const middles = ({ values, min, max }) => values ?? min.map((low, at) => (low + max[at]) / 2);
   const [a, b] = [carrier, own].map((channel) => middles(series.channels[channel]));
   const x = Float64Array.from(a, (_, k) => series.start + ((k + 0.5) * bucket - 0.5) / rate);
@@ -124,7 +124,7 @@ function usePreviews(draft, signal) {
       if (now === last) return;
       last = now;
       const cycles = draft.scene.duration * frequency;
-      const points = Math.round(limit((1.1 * cycles) / MOST_BUCKET, ...POINTS)) || POINTS[1];
+      const points = Math.round(limit((1.1 * cycles) / MAX_BUCKET, ...POINTS)) || POINTS[1];
       preview.ask({ ...previewScene(draft.scene), points });
       const next = bareScene(draft.scene);
       const text = JSON.stringify(next.scene);

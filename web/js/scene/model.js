@@ -1,8 +1,8 @@
 // What a drawing of a scene shows: its storeys and dampers, and the sentence that says it. What cannot be read is left out.
 import { number, quantity, words } from "../units.js";
 
-export const MOST_STOREYS = 40; // that are drawn, from the top
-export const MOST_DAMPERS = 12;
+export const MAX_STOREYS = 40; // that are drawn, from the top
+export const MAX_DAMPERS = 12;
 const LABEL = 32; // letters
 
 export const limit = (value, low, high) => Math.min(high, Math.max(low, value));
@@ -86,9 +86,9 @@ export function modelOf(scene, plan) {
   const excitation = Object(scene?.excitation);
   const all = storeysOf(structure, excitation);
   const every = list(scene?.dampers).map((one, at) => damperOf(Object(one), at, all, plan));
-  const storeys = all.slice(0, MOST_STOREYS);
+  const storeys = all.slice(0, MAX_STOREYS);
   const lowest = storeys.at(-1).index;
-  const dampers = every.filter(({ storey }) => storey >= lowest).slice(0, MOST_DAMPERS);
+  const dampers = every.filter(({ storey }) => storey >= lowest).slice(0, MAX_DAMPERS);
   const [top] = all;
   const base = baseOf(excitation);
   const released = top.start ? `starts at ${quantity(top.start, "m")}` : "";

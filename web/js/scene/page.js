@@ -128,7 +128,7 @@ function EstimatePanel({ session, onGo }) {
 
 export const page = pageOf(() => "Scene", ScenePage);
 
-export function JsonView({ draft }) {
+function JsonView({ draft }) {
   const [isOpen, setIsOpen] = useState(false);
   return html`<details class="panel">
     <summary onClick=${() => setIsOpen(true)}><h2>The scene as JSON</h2></summary>
@@ -198,7 +198,7 @@ function Answer({ answer, onGo }) {
 }
 
 // `outcome` is {answer}, {faults} or {error}, or null.
-export function Estimate({ outcome, onGo }) {
+function Estimate({ outcome, onGo }) {
   if (outcome === null) return null;
   const { answer, faults, error } = outcome;
   if (faults)

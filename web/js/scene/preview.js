@@ -1,16 +1,16 @@
 // What a scene does while it is edited: runs that the service keeps nothing of, one at a time, always the newest scene.
 import { check, post } from "../api.js";
-import { storeysOf } from "./state.js";
+import { storeyCount } from "./url.js";
 
-const MOST_COST = 0.05; // s of processor time that a preview may take
+const MAX_COST = 0.05; // s of processor time that a preview may take
 const LARGE = 20; // storeys: such scenes are asked what they cost before they are run
 
-export const isTooLong = ({ cost }) => cost.cpu_seconds > MOST_COST;
+export const isTooLong = ({ cost }) => cost.cpu_seconds > MAX_COST;
 export const tooLong = () => new Error("This run is too long for a preview; Run shows it.");
 
 // A run that the service keeps nothing of.
 export async function preview({ scene, points }, signal) {
-  if (storeysOf(scene) > LARGE && isTooLong(await check(scene))) throw tooLong();
+  if (storeyCount(scene) > LARGE && isTooLong(await check(scene))) throw tooLong();
   return post(`v1/preview?points=${points}`, scene, { signal });
 }
 

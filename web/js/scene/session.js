@@ -3,7 +3,7 @@ import { go } from "../address.js";
 import { check, submit } from "../api.js";
 import { makeDraft } from "../form/draft.js";
 import { createStore } from "../ui/store.js";
-import { keep, open, sponge } from "./state.js";
+import { keep, open, sponge } from "./url.js";
 
 const PAUSE = 250; // ms without a change
 
@@ -104,9 +104,9 @@ export function makeSession(signal) {
 }
 
 const STEP_PAUSE = 600; // ms without a change: what follows is another step
-const MOST = 100;
+const MAX_STEPS = 100;
 
-export function makeHistory(draft) {
+function makeHistory(draft) {
   let past = [];
   let future = [];
   let present = JSON.stringify(draft.scene);
@@ -120,7 +120,7 @@ export function makeHistory(draft) {
     const next = JSON.stringify(draft.scene);
     if (next === present) return;
     const now = performance.now();
-    if (now - last > STEP_PAUSE) past = [...past, present].slice(-MOST);
+    if (now - last > STEP_PAUSE) past = [...past, present].slice(-MAX_STEPS);
     last = isHeld ? Infinity : now;
     present = next;
     future = [];

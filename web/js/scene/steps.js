@@ -6,7 +6,7 @@ import { place, unitAt } from "./inputs.js";
 import { Help } from "../ui/controls.js";
 import { html, useEffect, useMemo } from "../ui/preact.js";
 import { title } from "../units.js";
-import { sponge, storeysOf } from "./state.js";
+import { sponge, storeyCount } from "./url.js";
 
 const STEPS = [
   ["structure"],
@@ -22,7 +22,7 @@ const STEPS = [
 // Asked for without "More", though it need not be said.
 const SHOWN =
   /\/(damping|\w*buffer|displacement|name|accuracy|title|labels)$|^\/output\/\w+$|^\/study\/axes/;
-const MOST_VARIABLES = 200;
+const MAX_VARIABLES = 200;
 
 // What a sweep may vary: the scene's own numbers, its buffers, the seed.
 function variables(scene, schema) {
@@ -32,7 +32,7 @@ function variables(scene, schema) {
     return place(pointer) + (unit ? ` [${unit}]` : "");
   };
   const walk = (value, pointer) => {
-    if (found.length > MOST_VARIABLES || /^\/(study|output|excitation\/samples)/.test(pointer))
+    if (found.length > MAX_VARIABLES || /^\/(study|output|excitation\/samples)/.test(pointer))
       return;
     if (typeof value === "number" || pointer.endsWith("buffer"))
       found.push([pointer, nameOf(pointer)]);
@@ -96,7 +96,7 @@ function starts(draft) {
 // A structure of another kind starts from where the last one did, the storeys below the top in proportion.
 function fitStart(draft) {
   const pointer = "/excitation/displacement";
-  const count = storeysOf(draft.scene);
+  const count = storeyCount(draft.scene);
   const top = [draft.get(pointer)].flat().at(-1);
   if (!top) return;
   const parts = Array.from({ length: count }, (_, at) => round((top * (at + 1)) / count));
@@ -108,7 +108,7 @@ export function SceneForm({ schema, draft, widgets }) {
     () => ({
       start: (pointer, kind) => starts(draft)[kind ? `${pointer} ${kind}` : pointer],
       shows: (pointer) =>
-        SHOWN.test(pointer) || (pointer.endsWith("/storey") && storeysOf(draft.scene) > 1),
+        SHOWN.test(pointer) || (pointer.endsWith("/storey") && storeyCount(draft.scene) > 1),
       widgets: [...widgets, [/^\/study\/axes\/\d+\/pointer$/, axisField(schema)]],
     }),
     [schema, draft],

@@ -10,7 +10,7 @@ import { Table } from "../ui/table.js";
 import { capital, metricOf, number, quantity, title, words } from "../units.js";
 import { Bars, Decision, sentence } from "./parts.js";
 
-const MOST_NAMED = 3; // in a sentence
+const MAX_NAMED = 3; // in a sentence
 const PROPER = /^(hertz|hunt crossley|lankarani nikravesh|flores|jankowski)/;
 const modelName = (name) =>
   words(name).replace(PROPER, (names) => names.split(" ").map(capital).join("-"));
@@ -54,7 +54,7 @@ function partingsOf(entries, part) {
   const [own, ...others] = entries;
   const all = others.filter(({ divergence }) => divergence?.time !== null);
   if (all.length === 0) return null;
-  const first = all.toSorted((a, b) => a.divergence.time - b.divergence.time).slice(0, MOST_NAMED);
+  const first = all.toSorted((a, b) => a.divergence.time - b.divergence.time).slice(0, MAX_NAMED);
   const texts = first.map(
     ({ name, divergence }) =>
       `${modelName(name)} from ${quantity(divergence.time, "s")} on${divergence.is_trusted ? "" : " (or by rounding)"}`,

@@ -10,7 +10,7 @@ import { number, quantity, title, words } from "../units.js";
 import { Bars, Decision, SceneLink, between, plainScene, quantities } from "./parts.js";
 
 // Bins by the rule of Freedman and Diaconis, at least as many as that of Sturges.
-export function histogram(values) {
+function histogram(values) {
   const sorted = values.toSorted((a, b) => a - b);
   const [low, high] = [sorted[0], sorted.at(-1)];
   const quantile = (part) => sorted[Math.min(sorted.length - 1, Math.floor(part * sorted.length))];

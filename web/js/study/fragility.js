@@ -11,7 +11,7 @@ import { Decision, between, quantities, remarksOf } from "./parts.js";
 const STEPS = 200;
 
 // The standard normal distribution, to 1e-7 (Abramowitz and Stegun, 26.2.17).
-export function normal(x) {
+function normal(x) {
   const t = 1 / (1 + 0.2316419 * Math.abs(x));
   const density = Math.exp((-x * x) / 2) / Math.sqrt(2 * Math.PI);
   const tail =

@@ -22,14 +22,14 @@ import {
   tellingMetric,
 } from "./sweep_model.js";
 
-const MOST_POINTS = 100000; // that a page takes
-const MOST_LINES = 8;
+const MAX_POINTS = 100000; // that a page takes
+const MAX_LINES = 8;
 
 // Loads the table at `path`; `again` changes while a job adds points. `given` is the result of the unchanged scene, `jobId`
 // the job that makes it.
 export function Sweep({ path, points, given, jobId, query, change, again }) {
   const loaded = useLoaded((signal) => get(path, null, signal), [path], again);
-  if (points > MOST_POINTS)
+  if (points > MAX_POINTS)
     return html`<p>Too many points to draw: save them as CSV or NPZ below.</p>`;
   return html`<${Loaded} loaded=${loaded}>
     ${(answer) =>
@@ -230,7 +230,7 @@ function seriesOf(model, { kind, x, over, fixed }, metric, chosen) {
   }
   const start = chosen === undefined ? model.axes.map(() => 0) : positionsOf(model, chosen);
   for (const axis of model.varying) if (!fixed.includes(axis)) start[axis.index] = 0;
-  const lines = over ? over.values.slice(0, MOST_LINES) : [null];
+  const lines = over ? over.values.slice(0, MAX_LINES) : [null];
   return lines.map((_, line) => {
     const rows = x.values.map((_value, at) => {
       const positions = [...start];

@@ -8,7 +8,7 @@ import { quantity, title } from "../units.js";
 import { JobButton, SceneLink } from "./parts.js";
 import { positionsOf, rowAt } from "./sweep_model.js";
 
-const MOST_ROWS = 1000; // of the table
+const MAX_ROWS = 1000; // of the table
 
 // The point that is chosen: its numbers, its run, its scene. Other points are a step along an axis away.
 export function Point({ answer, model, chosen, best, sceneOf, pick, isDrawn }) {
@@ -76,7 +76,7 @@ function textAt(model, axis, row) {
 }
 
 export function Points({ answer, model, chosen, pick, isOpen }) {
-  const rows = useMemo(() => [...model.indices.keys()].slice(0, MOST_ROWS), [model]);
+  const rows = useMemo(() => [...model.indices.keys()].slice(0, MAX_ROWS), [model]);
   const columns = useMemo(
     () => [
       {

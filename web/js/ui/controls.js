@@ -217,7 +217,7 @@ export function Tabs({ label, tabs, chosen, onChoose }) {
   </section>`;
 }
 
-const MOST_BUTTONS = 8;
+const MAX_BUTTONS = 8;
 
 // Of buttons side by side, about, in pixels.
 const widthOf = (options) => options.reduce((sum, { label }) => sum + 7 * label.length + 22, 60);
@@ -235,7 +235,7 @@ const ChoiceList = ({ label, options, value, onChange }) =>
 
 // One of a few: [{value, label}] as buttons side by side.
 export const Choice = (props) =>
-  props.options.length > MOST_BUTTONS || widthOf(props.options) > innerWidth
+  props.options.length > MAX_BUTTONS || widthOf(props.options) > innerWidth
     ? html`<${ChoiceList} ...${props} />`
     : html`<${ChoiceButtons} ...${props} />`;
 

@@ -61,7 +61,7 @@ export const svgBlob = (svg) =>
   new Blob([new XMLSerializer().serializeToString(svg)], { type: "image/svg+xml" });
 
 // Draws an SVG element with `width` and `height` on a canvas, `ratio` pixels per pixel.
-export async function drawSvg(svg, canvas, ratio = 2) {
+async function drawSvg(svg, canvas, ratio = 2) {
   const [width, height] = ["width", "height"].map((name) => Number(svg.getAttribute(name)));
   const url = URL.createObjectURL(svgBlob(svg));
   try {

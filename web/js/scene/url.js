@@ -34,7 +34,7 @@ export async function open({ s, example, result, job, buffer, record }, left) {
   return sponge();
 }
 
-export const storeysOf = ({ structure } = {}) =>
+export const storeyCount = ({ structure } = {}) =>
   [structure?.masses ?? structure?.mass].flat().length;
 
 // The same scene as one would type it: materials by name, the usual channels unsaid.
@@ -44,7 +44,7 @@ function typical(scene) {
   for (const damper of dampers)
     for (const name in damper) damper[name] = damper[name].material ?? damper[name];
   if (
-    channels.length === 3 * storeysOf(scene) + 2 * dampers.length &&
+    channels.length === 3 * storeyCount(scene) + 2 * dampers.length &&
     /^(displacement|velocity|acceleration|damper_displacement|contact_force|_\d+|,)*$/.test(
       channels,
     )
