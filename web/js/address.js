@@ -42,6 +42,10 @@ export function setQuery(changes, push = false) {
   if (target !== location.hash) history[push ? "pushState" : "replaceState"](null, "", target);
 }
 
+// The page of a job: that of its result once it is there.
+export const jobPath = ({ id, status, result, result_deleted: isDeleted }) =>
+  status === "successful" && !isDeleted ? `results/${result}` : `jobs/${id}`;
+
 // A text for the URL from a value, and back: JSON, deflated, in base64url.
 const through = (data, step) => new Response(new Blob([data]).stream().pipeThrough(step));
 export async function pack(value) {

@@ -54,13 +54,14 @@ async function send(method, path, { json, body, type, headers, query, signal }) 
   }
 }
 
-let pageSignal = null; // until this is aborted somebody reads the page that asks
+let pageSignal = null; // aborted when the page in view is left
 export function setPageSignal(signal) {
   pageSignal = signal;
 }
 
 // One exchange; a Refusal where the answer is none. Options: json (a body), body and type (another one), headers, query
-// (null leaves one out), signal: once it is aborted there is no answer, but what writes is sent whole.
+// (null leaves one out), signal: once it is aborted there is no answer, but what writes is sent whole. Without a signal the
+// answer is for the page in view; with null it is wanted whatever page follows.
 export async function ask(method, path, { signal = pageSignal, ...more } = {}) {
   const options = { ...more, signal: method === "GET" ? signal : null };
   let response = await send(method, path, options);
@@ -90,13 +91,9 @@ export const post = async (path, json, options) =>
   (await ask("POST", path, { ...options, json })).json();
 export const remove = async (path) => (await ask("DELETE", path)).json();
 
-// A file saved under `name`. With a token it is fetched first, since a link cannot carry one.
-export async function save(path, name) {
-  const href = token()
-    ? URL.createObjectURL(await (await ask("GET", path, { signal: null })).blob())
-    : address(path);
-  Object.assign(document.createElement("a"), { download: name, href }).click();
-  setTimeout(() => URL.revokeObjectURL(href), 60000);
+export async function wait(ms, signal) {
+  await new Promise((resolve) => setTimeout(resolve, ms));
+  signal?.throwIfAborted();
 }
 
 // Submits a scene; the job as it is at once, done or not.
@@ -107,7 +104,7 @@ export const check = (scene) => post("v1/jobs?dry_run=1", scene);
 
 // Follows a job to its end, which is returned: `onChange(job)` each second and at its end. While nobody answers (a daemon that
 // starts anew takes its jobs up again) the job has `isLost`.
-export async function follow(job, onChange, signal) {
+export async function follow(job, onChange, signal = pageSignal) {
   for (;;) {
     try {
       job = await get(`v1/jobs/${job.id}`, { wait: 1 }, signal);
@@ -116,9 +113,17 @@ export async function follow(job, onChange, signal) {
     } catch (error) {
       if (!(error.status === 0 || error.status >= 500)) throw error;
       onChange({ ...job, isLost: true });
-      await new Promise((resolve) => setTimeout(resolve, 1000));
+      await wait(1000, signal);
     }
   }
+}
+
+// Runs a scene to its end: the id of its result.
+export async function runScene(scene) {
+  const job = await submit(scene);
+  const end = job.finished ? job : await follow(job, () => {});
+  if (end.status !== "successful") throw Object.assign(new Error("The run failed"), end.problem);
+  return end.result;
 }
 
 // A JSON Schema by name, asked for once.

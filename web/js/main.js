@@ -6,27 +6,23 @@ import { settings } from "./settings.js";
 import { connectTheme } from "./theme.js";
 import { announce } from "./ui/announce.js";
 
+// [path of the address, its module, what its page begins with: asked for while its modules are loaded].
 // A module's `page` is {title(address), show(host, address, signal) -> {change(address), redraw(), leave()}}: for a new query on
 // the same path, for other units, and for the end, when `signal` is aborted.
-const pages = {
-  scene: () => import("./scene/page.js"),
-  jobs: () => import("./runs/runs.js"),
-  job: () => import("./runs/run.js"),
-  result: () => import("./result/page.js"),
-  report: () => import("./result/report.js"),
-  compare: () => import("./runs/compare.js"),
-  materials: () => import("./library/materials.js"),
-  material: () => import("./library/material.js"),
-  measure: () => import("./library/drop_test.js"),
-  records: () => import("./library/records.js"),
-  record: () => import("./library/record.js"),
-  shell: () => import("./shell.js"),
-};
-
-// What a page begins with, asked for while its modules are loaded.
-const FIRST = {
-  result: ([, id]) => `v1/results/${encodeURIComponent(id)}`,
-};
+const pages = [
+  [/^(scene)?$/, () => import("./scene/page.js")],
+  [/^jobs$/, () => import("./runs/runs.js")],
+  [/^jobs\/[^/]+$/, () => import("./runs/run.js")],
+  [/^results\/[^/]+$/, () => import("./result/page.js"), (id) => `v1/results/${id}`],
+  [/^results\/[^/]+\/report$/, () => import("./result/report.js")],
+  [/^compare$/, () => import("./runs/compare.js")],
+  [/^materials$/, () => import("./library/materials.js")],
+  [/^materials\/[^/]+$/, () => import("./library/material.js")],
+  [/^materials\/[^/]+\/measure$/, () => import("./library/drop_test.js")],
+  [/^records$/, () => import("./library/records.js")],
+  [/^records\/[^/]+$/, () => import("./library/record.js")],
+  [/^shell$/, () => import("./shell.js")],
+];
 
 const [main, tokenButton, skip, version, hint, units] = [
   "main",
@@ -37,16 +33,6 @@ const [main, tokenButton, skip, version, hint, units] = [
   "units-menu",
 ].map((id) => document.getElementById(id));
 let current = null; // {path, stop, controller: promise}
-
-// "materials/felt" is the page "material", "materials/felt/measure" the page "measure".
-function nameOf([first = "scene", one, part]) {
-  if (part) return part;
-  return one ? first.slice(0, -1) : first;
-}
-
-// What is of one thing has its name; parts belong to their page alone.
-const ADDRESSES =
-  /^(|scene|compare|shell|jobs(\/[^/]+)?|results\/[^/]+(\/report)?|materials(\/[^/]+(\/measure)?)?|records(\/[^/]+)?)$/;
 
 async function show() {
   const last = current;
@@ -87,20 +73,22 @@ function element(name, className, text) {
 async function open(address, signal, isNext) {
   setPageSignal(signal);
   if (isNext) main.replaceChildren("Loading …"); // what is left takes no clicks
-  const [first = "scene"] = address.path;
-  const section = first === "results" ? "jobs" : first;
+  const [top = "scene"] = address.path;
+  const section = top === "results" ? "jobs" : top;
   for (const anchor of document.querySelectorAll("#pages a"))
     anchor.ariaCurrent = anchor.hash === `#/${section}` ? "page" : null;
-  welcome(first === "scene");
+  welcome(top === "scene");
   try {
-    const name = nameOf(address.path);
-    if (!Object.hasOwn(pages, name) || !address.path.join("/").match(ADDRESSES))
-      throw {
-        title: "No such page",
-        detail: `There is no page "${address.path.join("/")}" here. The links above lead to all pages.`,
-      };
-    if (Object.hasOwn(FIRST, name)) prefetch(FIRST[name](address.path));
-    const { page } = await pages[name]();
+    const path = address.path.join("/");
+    const found = pages.find(([pattern]) => pattern.test(path));
+    if (!found)
+      throw Object.assign(
+        new Error(`There is no page "${path}" here. The links above lead to all pages.`),
+        { title: "No such page" },
+      );
+    const [, load, first] = found;
+    if (first) prefetch(first(encodeURIComponent(address.path[1])));
+    const { page } = await load();
     if (signal.aborted) return null;
     const title = page.title(address);
     const host = element("div", "page", "Loading …");

@@ -3,7 +3,7 @@ import { ask } from "./api.js";
 import { CodeBlock, Loaded } from "./ui/controls.js";
 import { pageOf } from "./ui/page.js";
 import { html } from "./ui/preact.js";
-import { useLoaded } from "./ui/store.js";
+import { useLoaded } from "./ui/hooks.js";
 
 const load = async (signal) =>
   (await ask("GET", "", { headers: { Accept: "text/plain" }, signal })).text();

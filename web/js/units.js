@@ -34,6 +34,10 @@ export function number(value, digits = 4) {
   return `${String(Number(mantissa)).replace("-", "−")} × 10${superscript(Number(power))}`;
 }
 
+// "12.3 %"; what is next to nothing as a power of ten.
+export const share = (part, digits = 3) =>
+  part !== 0 && Math.abs(part) < 1e-5 ? `${number(part, 2)}` : `${number(100 * part, digits)} %`;
+
 // The unit that the reader chose for this one, also squared as in spectra: [factor, unit]; null for what suits the number.
 export function chosenScale(unit) {
   const chosen = settings.get();
@@ -60,8 +64,8 @@ export function scale(size, unit) {
 // "15 mm", "5.718 N", "9.611 m/s²".
 export function quantity(value, unit, digits = 4) {
   if (isUnknown(value)) return "–";
-  const [factor, scaled] = scale(Math.abs(value), unit),
-    text = number(value / factor, digits);
+  const [factor, scaled] = scale(Math.abs(value), unit);
+  const text = number(value / factor, digits);
   return scaled && scaled !== "1" ? `${text}\u00a0${pretty(scaled)}` : text;
 }
 
@@ -83,13 +87,15 @@ export const words = (name) =>
     .replace(/\brms\b/g, "RMS")
     .replace(/\bpsd\b/g, "PSD");
 export const capital = (text) => text.replace(/^./, (letter) => letter.toUpperCase());
+export const uncapital = (text) => (text ?? "").replace(/^./, (letter) => letter.toLowerCase());
+export const yesNo = { true: "yes", false: "no" };
 export const title = (name) => capital(words(name));
 
 // A time of day: "14:03" today, "21 Nov 2026, 14:03" before.
 export function moment(text) {
   if (!text) return "–";
-  const when = new Date(text),
-    isToday = when.toDateString() === new Date().toDateString();
+  const when = new Date(text);
+  const isToday = when.toDateString() === new Date().toDateString();
   return when.toLocaleString("en-GB", {
     ...(isToday ? {} : { dateStyle: "medium" }),
     timeStyle: "short",

@@ -1,11 +1,10 @@
 // One chart: series over one axis, with marks of events, shaded spans, rules, zoom, a cursor with a tooltip, a legend that
 // hides and isolates, its picture and its numbers to take along. Everything is SVG: the page's style colours it.
+import { createStore } from "../store.js";
 import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { Help, withSubscripts } from "../ui/controls.js";
-import { announce } from "../ui/announce.js";
-import { freshId } from "../ui/ids.js";
-import { useWidth } from "../ui/width.js";
-import { quantity } from "../units.js";
+import { useId, useWidth } from "../ui/hooks.js";
+import { quantity, uncapital } from "../units.js";
 import { axisUnit, namesAlong, textWidth, XAxis, YAxis } from "./axis.js";
 import { Cursor, cursorOf } from "./cursor.js";
 import { ChartTools, DataTable } from "./export.js";
@@ -71,11 +70,10 @@ export function Chart(props) {
 }
 
 function Drawn(props) {
-  const { title, description, x, y, width, height = 200 } = props;
-  const { isCompact = false, isShort = false } = props;
-  const { isFixed = false } = props;
+  const { title, description, x, y, width, height = 200, onPick } = props;
+  const { isCompact = false, isShort = false, isFixed = false } = props;
   const { spans = [], rules = [], markers = [], underlay, children } = props;
-  const id = useMemo(() => freshId("chart"), []);
+  const id = useId("chart");
   const box = useRef(null);
   const svg = useRef(null);
   const [hidden, setHidden] = useState(new Set());
@@ -101,7 +99,8 @@ function Drawn(props) {
   const outerHeight = bottom + (isCompact ? 6 : MARGIN.bottom + below);
   const yScale = makeY(valueDomain(y, series, rules, domain), [bottom, top]);
   const density = Math.max(1, globalThis.devicePixelRatio ?? 1);
-  const cursor = cursorOf(props.group ?? id);
+  const ownCursor = useMemo(() => createStore(null), []);
+  const cursor = props.group ? cursorOf(props.group) : ownCursor;
 
   const setRange = (next) => {
     const isWhole = next === null || (next[0] <= whole[0] && next[1] >= whole[1]);
@@ -109,7 +108,6 @@ function Drawn(props) {
     if (props.onRange) props.onRange(chosen);
     else setOwnRange(chosen);
   };
-  const { onPick } = props;
   const axes = { x, y };
   const state = {
     id,
@@ -122,7 +120,6 @@ function Drawn(props) {
     domain,
     cursor,
     setRange,
-    announce,
     onPick,
   };
   const latest = useRef(state);
@@ -134,7 +131,7 @@ function Drawn(props) {
 
   const xTitle = axisUnit(x, domain).title;
   const yTitle = axisUnit({ ...y, label: y.label ?? title }, yScale.domain).title;
-  const both = isShort ? `${yTitle} over ${lower(xTitle)}` : yTitle;
+  const both = isShort ? `${yTitle} over ${uncapital(xTitle)}` : yTitle;
   const heading = props.heading ?? (y.categories ? title : both);
   const plot = { x: xScale, y: yScale, left, right, top, bottom };
   const summary = description ?? describe(props.series, x, y, domain);
@@ -199,9 +196,6 @@ function Drawn(props) {
     <p class="visually-hidden" id=${`${id}-summary`}>${summary}</p>
     ${hasNumbers && html`<${DataTable} title=${title} series=${props.series} x=${x} y=${y} />`}`;
 }
-
-// "Time [ms]" as "time [ms]".
-const lower = (text) => text.replace(/^./, (letter) => letter.toLowerCase());
 
 // A sentence with the ranges of what is shown.
 function describe(series, x, y, domain) {

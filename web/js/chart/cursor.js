@@ -1,6 +1,7 @@
 // The cursor of a chart and its tooltip. Charts of a group share one cursor; the tooltip is at the chart under the pointer.
 import { html, useLayoutEffect, useRef, useState } from "../ui/preact.js";
-import { createStore, useStore } from "../ui/store.js";
+import { useStore } from "../ui/hooks.js";
+import { createStore } from "../store.js";
 import { quantity } from "../units.js";
 import { ink, nearestIndex } from "./series.js";
 

@@ -1,7 +1,7 @@
 // What can be taken from a chart: its picture (PNG, SVG) and its numbers.
 import { html } from "../ui/preact.js";
-import { fileName, plainColor, pngBlob, saveBlob, standaloneSvg, svgBlob } from "../ui/files.js";
-import { CopyButton, IconButton } from "../ui/controls.js";
+import { fileName, pngBlob, saveBlob, standaloneSvg, svgBlob, themeColor } from "../ui/files.js";
+import { CopyButton, IconButton, tabbed } from "../ui/controls.js";
 import { axisUnit } from "./axis.js";
 import { number, pretty } from "../units.js";
 import { ink } from "./series.js";
@@ -17,14 +17,7 @@ function element(name, attributes, text) {
   return node;
 }
 
-// The variable's colour as this theme has it: a computed value, unlike the pair of light-dark().
-function themeColor(name) {
-  const probe = document.body.appendChild(document.createElement("span"));
-  probe.style.color = ink(name);
-  const found = plainColor(getComputedStyle(probe).color);
-  probe.remove();
-  return found;
-}
+const colorOf = (name) => themeColor(ink(name));
 
 // The chart as a picture that stands alone: heading, legend and background are part of it.
 function picture(svg, heading, series) {
@@ -37,9 +30,9 @@ function picture(svg, heading, series) {
     viewBox: `0 0 ${width} ${height + HEAD}`,
   });
   whole.setAttribute("font-family", plot.getAttribute("font-family"));
-  const text = { fill: themeColor("text"), "font-size": 13 };
+  const text = { fill: colorOf("text"), "font-size": 13 };
   whole.append(element("title", {}, heading));
-  whole.append(element("rect", { width, height: height + HEAD, fill: themeColor("front") }));
+  whole.append(element("rect", { width, height: height + HEAD, fill: colorOf("front") }));
   whole.append(element("text", { x: 8, y: 19, "font-weight": 600, ...text }, heading));
   let x = width - 8;
   for (const one of [...series].reverse()) {
@@ -52,7 +45,7 @@ function picture(svg, heading, series) {
       ),
     );
     x -= one.label.length * 6.6 + 8;
-    const fill = themeColor(one.color);
+    const fill = colorOf(one.color);
     whole.append(element("rect", { x: x - 12, y: 13, width: 14, height: 3, fill }));
     x -= 26;
   }
@@ -105,9 +98,10 @@ export function DataTable({ title, series, x, y }) {
     ...series.map((one) => `${one.label} [${pretty(one.unit ?? y.unit ?? "1")}]`),
   ];
   const lines = () =>
-    [heads, ...rows.map(([at, cells]) => [at, ...series.map((_, column) => cells[column] ?? "")])]
-      .map((cells) => cells.join("\t"))
-      .join("\n");
+    tabbed([
+      heads,
+      ...rows.map(([at, cells]) => [at, ...series.map((_, column) => cells[column] ?? "")]),
+    ]);
   const xText = (at) => (x.categories ? x.categories[at] : number(at, 6));
   const yText = (value) => (y.categories ? y.categories[value] : number(value, 6));
   const isCut = rows.length > MAX_ROWS;

@@ -1,4 +1,5 @@
 // How a chart is zoomed, moved and read: by mouse, fingers and keys. `latest.current` is the state of chart.js.
+import { announce } from "../ui/announce.js";
 import { markerAt, placeText, valuesAt } from "./cursor.js";
 
 const SHORT = 5; // pixels: less is a click, not a drag
@@ -160,7 +161,7 @@ export function handlePointers(box, svg, latest) {
 
 // The cursor to the next of these places; what is there is said.
 function step(state, direction, places) {
-  const { cursor, domain, series, markers, xScale, announce, id, axes } = state;
+  const { cursor, domain, series, markers, xScale, id, axes } = state;
   const now = cursor.get()?.x ?? (direction > 0 ? -Infinity : Infinity);
   const least = (domain[1] - domain[0]) * 1e-9;
   const ahead = places.filter(
@@ -170,8 +171,8 @@ function step(state, direction, places) {
   const x = ahead.reduce((a, b) => ((b - a) * direction < 0 ? b : a));
   cursor.set({ x, y: null, owner: id });
   const marker = markerAt(markers, xScale, x);
-  const said = valuesAt(series, x, axes?.y ?? {}).map((one) => `${one.series.label} ${one.text}`);
-  announce([placeText(axes?.x ?? {}, x), ...said, marker?.label].filter(Boolean).join(", "));
+  const said = valuesAt(series, x, axes.y).map((one) => `${one.series.label} ${one.text}`);
+  announce([placeText(axes.x, x), ...said, marker?.label].filter(Boolean).join(", "));
 }
 
 export function handleKey(event, state) {

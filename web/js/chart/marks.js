@@ -16,6 +16,14 @@ export function Spans({ spans, plot }) {
   });
 }
 
+// Rules at the stops of a damper, as its free mass meets them.
+export const wallsOf = ({ offset = 0, clearance }) =>
+  [-1, 1].map((side) => ({
+    y: offset + (side * clearance) / 2,
+    label: side < 0 ? "left stop" : "right stop",
+    color: "wall",
+  }));
+
 const LINE = 14; // px
 const PLACES = 40; // along a level rule that are tried
 

@@ -26,7 +26,7 @@ export function logScale(domain, pixels) {
 }
 
 // The smallest of 1, 2, 2.5, 5 times a power of ten that is at least `least`.
-function roundStep(least) {
+export function roundStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return power * [1, 2, 2.5, 5, 10].find((step) => step * power >= least * 0.999999);
 }

@@ -1,5 +1,6 @@
 // A document while it is edited: values by JSON Pointer, what the service said of it, and who wants to know.
-import { useEffect, useReducer, useRef } from "../ui/preact.js";
+import { useEffect, useRef } from "../ui/preact.js";
+import { useRedraw } from "../ui/hooks.js";
 
 export const parts = (pointer) =>
   pointer
@@ -24,13 +25,12 @@ function put(holder, [name, ...deeper], value) {
 const isWithin = (inner, outer) => `${inner}/`.startsWith(`${outer}/`);
 
 // A listener gets {pointer, isMoving} after a change ("" is all of it), {check} after a dry run's answer or the service's faults.
-export function makeDraft(scene, signal = null) {
+export function makeDraft(scene) {
   const listeners = new Set();
   const draft = {
     scene,
     faults: [],
     check: null,
-    signal,
     version: 0, // counts all news
     epoch: 0, // counts what replaced all of it
     get: (pointer) =>
@@ -38,15 +38,12 @@ export function makeDraft(scene, signal = null) {
         (at, name) => (isHolder(at) && Object.hasOwn(at, name) ? at[name] : undefined),
         draft.scene,
       ),
-    set(pointer, value) {
+    // `isMoving`: one change of many that follow each other, as of what is dragged.
+    set(pointer, value, isMoving = false) {
       put(draft.scene, parts(pointer), value);
-      notify({ pointer });
+      notify({ pointer, isMoving });
     },
-    // A change of many that follow each other, as of what is dragged.
-    move(pointer, value) {
-      put(draft.scene, parts(pointer), value);
-      notify({ pointer, isMoving: true });
-    },
+    move: (pointer, value) => draft.set(pointer, value, true),
     replace(next) {
       draft.scene = next;
       draft.epoch++;
@@ -72,7 +69,7 @@ export function makeDraft(scene, signal = null) {
 // The value at a place; the component is drawn again when that changes, or what is around it or the faults there, with `deep`
 // also when what is in it does.
 export function useDraft(draft, pointer, deep = true) {
-  const [, redraw] = useReducer((count) => count + 1, 0);
+  const redraw = useRedraw();
   const drawn = useRef(null);
   const faults = JSON.stringify(draft.faultsAt(pointer));
   drawn.current = { version: draft.version, faults };
@@ -90,7 +87,7 @@ export function useDraft(draft, pointer, deep = true) {
 
 // Draws a component again after each of these news of a draft.
 export function useNews(draft, matters = () => true) {
-  const [, redraw] = useReducer((count) => count + 1, 0);
+  const redraw = useRedraw();
   useEffect(() => {
     redraw();
     return draft.onChange((news) => matters(news) && redraw());

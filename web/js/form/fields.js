@@ -1,6 +1,6 @@
 // One value, one control, on one line: what is typed, and choices. What a place is for is seen while it has the focus.
 import { faultText } from "../ui/controls.js";
-import { freshId } from "../ui/ids.js";
+import { useId } from "../ui/hooks.js";
 import { html, useRef } from "../ui/preact.js";
 import { pretty, quantity, scale, words } from "../units.js";
 import { useDraft } from "./draft.js";
@@ -62,23 +62,22 @@ const defaultText = ({ default: value }) => (value === undefined ? undefined : v
 
 // A line: `control` is a function of the attributes {id, aria-describedby, aria-invalid}.
 export function Field({ pointer, schema, label, faults, hint, isWide, aside, control }) {
-  const id = useRef(null);
-  id.current ??= freshId("field");
+  const id = useId("field");
   const unit = schema["x-unit"];
   const attributes = {
-    id: id.current,
-    "aria-describedby": `${id.current}-hint ${id.current}-fault`,
+    id,
+    "aria-describedby": `${id}-hint ${id}-fault`,
     "aria-invalid": faults.length > 0,
   };
   return html`<div class=${isWide ? "field wide" : "field"} data-pointer=${pointer}>
-    <label for=${id.current}>
+    <label for=${id}>
       ${label}${unit && html`<span class="unit">${` [${pretty(unit)}]`}</span>`}
     </label>
     <div class="typed">
       ${control(attributes)}${aside && html`<span class="aside">${aside}</span>`}
-      <p class="hint" id=${`${id.current}-hint`}>${hint}</p>
+      <p class="hint" id=${`${id}-hint`}>${hint}</p>
     </div>
-    <p class="fault" id=${`${id.current}-fault`}>
+    <p class="fault" id=${`${id}-fault`}>
       ${faults
         .slice(0, 3)
         .map((fault) => faultText(fault))

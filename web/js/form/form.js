@@ -1,5 +1,5 @@
-// A JSON Schema as a form over a draft: objects, their kinds, lists; single values are fields.js. What need not be said waits
-// under "More"; what the schema does not know is kept.
+// A JSON Schema as a form over a draft: objects, their kinds, lists; single values are fields.js. Optional members without a value
+// are under "More"; members that the schema does not have are kept.
 import { faultText } from "../ui/controls.js";
 import { html, useEffect, useMemo, useRef } from "../ui/preact.js";
 import { title, words } from "../units.js";

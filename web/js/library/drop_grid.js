@@ -1,9 +1,8 @@
 // The grid in which drops are typed or pasted, a row each: heights in mm, times in ms. An empty height or approach speed is as
 // above it; a row without a reading is not sent.
 import { settings } from "../settings.js";
-import { freshId } from "../ui/ids.js";
+import { useId, useStore } from "../ui/hooks.js";
 import { html, useLayoutEffect, useRef, useState } from "../ui/preact.js";
-import { useStore } from "../ui/store.js";
 import { number, pretty, title } from "../units.js";
 
 const MAX_ROWS = 1000;
@@ -70,8 +69,7 @@ export function DropGrid({ pointer, schema, draft }) {
   const { length } = useStore(settings);
   const columns = columnsOf(schema, length);
   const [rows, setRows] = useState([emptyRow()]);
-  const id = useRef(null);
-  id.current ??= freshId("drop");
+  const id = useId("drop");
   const body = useRef(null);
 
   // Texts follow the unit of their column.
@@ -135,7 +133,7 @@ export function DropGrid({ pointer, schema, draft }) {
         >
           <input
             aria-label=${`${label}, drop ${row + 1}`}
-            aria-describedby=${`${id.current}-${row}`}
+            aria-describedby=${`${id}-${row}`}
             aria-invalid=${at >= 0 && draft.faultsAt(place).length > 0}
             class=${columns[column].type === "string" ? "long" : null}
             value=${cells[column]}
@@ -147,7 +145,7 @@ export function DropGrid({ pointer, schema, draft }) {
         </td>`;
       })}
       <td class="number" data-label="e">
-        <output id=${`${id.current}-${row}`}>${result && number(result.restitution, 3)}</output>
+        <output id=${`${id}-${row}`}>${result && number(result.restitution, 3)}</output>
       </td>
     </tr>`;
   };

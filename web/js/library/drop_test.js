@@ -7,12 +7,12 @@ import { focusField } from "../form/form.js";
 import { Loaded, Notice, Panel, withSubscripts } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { capital } from "../units.js";
 import { DropGrid } from "./drop_grid.js";
 import { materialPath, readMaterial } from "./format.js";
 import { Readings } from "./readings.js";
-import { Fields, markFaults, Refusal, widgetOf, WriteForm } from "./schema_form.js";
+import { Faults, Fields, markFaults, widgetOf, WriteForm } from "./schema_form.js";
 import { TraceField } from "./trace.js";
 
 const WAIT_MS = 400; // without a change, before the service is asked
@@ -80,8 +80,8 @@ function useEvaluation(slug, draft, fields) {
 }
 
 // The first step: the readings, and what they come to.
-function Entry({ material, schema, signal }) {
-  const draft = useMemo(() => makeDraft({}, signal), []);
+function Entry({ material, schema }) {
+  const draft = useMemo(() => makeDraft({}), []);
   const fields = useRef(null);
   const { answer, error, state, keep } = useEvaluation(material.slug, draft, fields);
   const keepByKey = (event) => {
@@ -112,7 +112,7 @@ function Entry({ material, schema, signal }) {
                 </p>`
           }
         </div>
-        ${error && html`<${Refusal} error=${error} onGo=${(pointer) => focusField(fields.current, pointer)} />`}
+        ${error && html`<${Faults} error=${error} onGo=${(pointer) => focusField(fields.current, pointer)} />`}
         <button type="button" class="primary" aria-keyshortcuts="Control+Enter" onClick=${keep}>
           Keep this test (Ctrl+Enter)
         </button>
@@ -174,7 +174,7 @@ function Proposal({ material, measurements, calibration }) {
   <//>`;
 }
 
-function DropTestPage({ address: { path: parts, query }, signal }) {
+function DropTestPage({ address: { path: parts, query } }) {
   const slug = parts[1];
   const { measurement, calibration } = query;
   const loaded = useLoaded(
@@ -199,7 +199,7 @@ function DropTestPage({ address: { path: parts, query }, signal }) {
                 measurements=${measurement}
                 calibration=${calibration}
               />`
-            : html`<${Entry} material=${material} schema=${schema} signal=${signal} />`
+            : html`<${Entry} material=${material} schema=${schema} />`
         }`}
   <//>`;
 }

@@ -1,8 +1,8 @@
 // What the pages of materials share: paths, numbers with their deviations, columns of tables, what differs between revisions.
 import { ask, get } from "../api.js";
-import { Loaded } from "../ui/controls.js";
+import { Loaded, sentence, withSubscripts } from "../ui/controls.js";
 import { html } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
 import { number, pretty, quantity, scale, title } from "../units.js";
 
@@ -73,6 +73,12 @@ export function memberText(value, unit) {
   const text = typeof value?.[0] === "object" ? JSON.stringify(value) : `${value ?? ""}`;
   return text.slice(0, 400) || "–";
 }
+
+export const Remarks = ({ warnings }) =>
+  warnings.length > 0 &&
+  html`<ul class="remarks hint">
+    ${warnings.map(({ detail }) => html`<li>${withSubscripts(sentence(detail))}</li>`)}
+  </ul>`;
 
 // What the second of two revisions has changed.
 export function Differences({ slug, first, second }) {

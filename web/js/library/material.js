@@ -1,10 +1,10 @@
 // One material: its numbers and how sure they are, k_b and c_b for a pair of masses, drop tests, revisions and their history.
 import { link } from "../address.js";
 import { get, schema } from "../api.js";
-import { Headlines, Loaded, Panel } from "../ui/controls.js";
+import { Facts, Headlines, Loaded, Panel } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
 import { moment, number, quantity, title } from "../units.js";
 import { Chart } from "../chart/chart.js";
@@ -67,19 +67,13 @@ function Numbers({ material, tests, used }) {
   return html`<${Headlines} items=${items} />`;
 }
 
-function Facts({ material, properties, used }) {
+function MaterialFacts({ material, properties, used }) {
   const names = Object.keys(properties).filter((name) => !IN_HEADLINES.test(name));
   const facts = names
     .map((name) => [title(name), memberText(material[name], properties[name]["x-unit"])])
     .filter(([, value]) => value !== "–");
   return html`<${Panel} title="What is known">
-    <dl class="list">
-      ${facts.map(
-        ([name, value]) =>
-          html`<dt>${name}</dt>
-            <dd>${value}</dd>`,
-      )}
-    </dl>
+    <${Facts} pairs=${facts} />
     <details>
       <summary>${`Results made with it: ${number(used.total)}`}</summary>
       <ul>
@@ -261,18 +255,18 @@ function Material({ material, revisions, steps, used, tests, properties }) {
         <${Revisions} material=${material} revisions=${revisions} />
       </div>
       <div>
-        <${Facts} material=${material} properties=${properties} used=${used} />
+        <${MaterialFacts} material=${material} properties=${properties} used=${used} />
         <${Changes} material=${material} properties=${properties} />
         <${Trail} slug=${slug} steps=${steps} />
       </div>
     </div>`;
 }
 
-function MaterialPage({ address, signal }) {
+function MaterialPage({ address }) {
   const slug = address.path[1];
   const { revision } = address.query;
   const loaded = useLoaded(
-    (own) => load(slug, revision, AbortSignal.any([own, signal])),
+    (signal) => load(slug, revision, signal),
     [address], // a change leads to its revision, which may be the same one
   );
   const current = loaded.data?.material;

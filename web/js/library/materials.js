@@ -1,11 +1,12 @@
 // All materials: searched by words and ranges, seen as e over contact time, added, imported and exported.
 import { go, link } from "../address.js";
-import { get, post, save } from "../api.js";
+import { get, post } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { Button, Failure, Help, Loaded, Panel } from "../ui/controls.js";
+import { Button, Failure, FileInput, Help, Loaded, Panel } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { save } from "../ui/files.js";
+import { useCount, useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
 import { figureColumns, range, statusColumn } from "./format.js";
 import { NamedForm } from "./schema_form.js";
@@ -156,15 +157,12 @@ function Import({ onDone }) {
       await post("v1/materials/import", undefined, { body, type });
       onDone();
     } catch (problem) {
-      if (problem.name !== "AbortError") setError(problem);
+      setError(problem);
     }
-  };
-  const forget = (event) => {
-    event.currentTarget.value = ""; // the same file may come again
   };
   return html`<label
       >A table (CSV) with slug, name, restitution and source, or an export (JSON)
-      <input type="file" accept=".csv,.json" onClick=${forget} onChange=${read} />
+      <${FileInput} accept=".csv,.json" onChange=${read} />
     </label>
     ${error && html`<${Failure} error=${error} />`}`;
 }
@@ -178,7 +176,7 @@ function AddForm() {
 function MaterialsPage({ address: { query } }) {
   const [isAdding, setIsAdding] = useState(false);
   const [isImporting, setIsImporting] = useState(false);
-  const [imports, setImports] = useState(0);
+  const [imports, countImport] = useCount();
   const loaded = useLoaded(
     (signal) => get("v1/materials", { ...query, limit: LIMIT }, signal),
     [JSON.stringify(query)],
@@ -209,7 +207,7 @@ function MaterialsPage({ address: { query } }) {
       </details>
       <details onToggle=${(event) => setIsImporting(event.currentTarget.open)}>
         <summary>Import</summary>
-        ${isImporting && html`<${Import} onDone=${() => setImports((count) => count + 1)} />`}
+        ${isImporting && html`<${Import} onDone=${countImport} />`}
       </details>
       <div class="row">
         ${files.map((name) => html`<${Button} onClick=${() => save(`v1/${name}`, name)}>${`Export ${name}`}<//>`)}

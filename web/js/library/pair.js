@@ -1,14 +1,13 @@
 // The contact of a material between two masses: k_b and c_b with their uncertainty, where they hold, and the force of an impact.
 import { setQuery, read } from "../address.js";
-import { get } from "../api.js";
+import { get, wait } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { Choice, Loaded, Panel, sentence, withSubscripts } from "../ui/controls.js";
-import { freshId } from "../ui/ids.js";
-import { html, useMemo, useRef, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { Choice, Loaded, Panel } from "../ui/controls.js";
+import { useId, useLoaded } from "../ui/hooks.js";
+import { html, useLayoutEffect, useMemo, useState } from "../ui/preact.js";
 import { Table } from "../ui/table.js";
 import { pretty, quantity, words } from "../units.js";
-import { range } from "./format.js";
+import { materialPath, range, Remarks } from "./format.js";
 
 const POINTS = 120;
 const WAIT_MS = 250; // without a change, before the service is asked
@@ -108,21 +107,15 @@ function Pair({ pair }) {
       ${`${validity(pair)}${isUncertain ? " ± is one standard uncertainty." : ""}`}
     </p>
     <${PulseChart} pair=${pair} />
-    ${
-      pair.warnings.length > 0 &&
-      html`<ul class="remarks hint">
-        ${pair.warnings.map(({ detail }) => html`<li>${withSubscripts(sentence(detail))}</li>`)}
-      </ul>`
-    }`;
+    <${Remarks} warnings=${pair.warnings} />`;
 }
 
 function MassField({ label, hint, value, isWrong, onInput }) {
-  const id = useRef(null);
-  id.current ??= freshId("mass");
+  const id = useId("mass");
   return html`<div class="field">
-    <label for=${id.current}>${label}<span class="unit">${` [${pretty("kg")}]`}</span></label>
+    <label for=${id}>${label}<span class="unit">${` [${pretty("kg")}]`}</span></label>
     <input
-      id=${id.current}
+      id=${id}
       value=${value}
       inputmode="decimal"
       autocomplete="off"
@@ -136,26 +129,25 @@ function MassField({ label, hint, value, isWrong, onInput }) {
 export function PairPanel({ material }) {
   const { slug, revision, impactor_mass: impactor } = material;
   const { query } = read();
-  const [own, setOwn] = useState(query.m ?? String(impactor ?? DEFAULT_MASS));
+  const initial = String(impactor ?? DEFAULT_MASS);
+  const [own, setOwn] = useState(query.m ?? initial);
   const [other, setOther] = useState(query.M ?? "");
   const [carried, setCarried] = useState(query.for ?? "scene");
   const masses = { damper_mass: toMass(own), structure_mass: toMass(other) };
   const isValid = masses.damper_mass !== null && (other.trim() === "" || masses.structure_mass);
   const loaded = useLoaded(
     async (signal) => {
-      setQuery({
-        m: query.m || own !== String(impactor ?? DEFAULT_MASS) ? own : null,
-        M: other,
-        for: carried === "scene" ? null : carried,
-      });
       if (!isValid) return null;
-      await new Promise((resolve) => setTimeout(resolve, WAIT_MS));
-      signal.throwIfAborted();
+      await wait(WAIT_MS, signal);
       const asked = { ...masses, identified_for: carried };
-      return get(`v1/materials/${encodeURIComponent(slug)}@${revision}/derived`, asked, signal);
+      return get(materialPath(slug, `@${revision}/derived`), asked, signal);
     },
     [slug, revision, own, other, carried],
   );
+  useLayoutEffect(() => {
+    const isInitial = own === initial && !query.m;
+    setQuery({ m: isInitial ? null : own, M: other, for: carried === "scene" ? null : carried });
+  }, [own, other, carried]);
   return html`<${Panel} title="For a pair of masses" help="Derived">
     <div class="fields">
       <${MassField}

@@ -4,7 +4,7 @@ import { extentOf, paddedDomain } from "../chart/scale.js";
 import { Headlines, sentence } from "../ui/controls.js";
 import { html } from "../ui/preact.js";
 import { quantity } from "../units.js";
-import { QUANTITIES, range } from "./format.js";
+import { QUANTITIES, range, Remarks } from "./format.js";
 
 // e and T_c with their intervals: [{label, value, note}].
 function headlinesOf(evaluation) {
@@ -90,24 +90,18 @@ export function Readings({ evaluation, warnings = [] }) {
   const isSaid = (text) => warnings.some(({ detail }) => detail === text);
   const items = headlinesOf(evaluation);
   return html`${
-    items.length > 0 ? html`<${Headlines} items=${items} />` : html`<p>Nothing counts yet.</p>`
-  }
-  ${
-    evaluation &&
-    QUANTITIES.map(
-      (shown) =>
-        html`<${ReadingsChart}
-          key=${shown.name}
-          quantity=${shown}
-          evaluation=${evaluation}
-          isSaid=${isSaid}
-        />`,
-    )
-  }
-  ${
-    warnings.length > 0 &&
-    html`<ul class="remarks hint">
-      ${warnings.map(({ detail }) => html`<li>${sentence(detail)}</li>`)}
-    </ul>`
-  }`;
+      items.length > 0 ? html`<${Headlines} items=${items} />` : html`<p>Nothing counts yet.</p>`
+    }
+    ${
+      evaluation &&
+      QUANTITIES.map(
+        (shown) =>
+          html`<${ReadingsChart}
+            key=${shown.name}
+            quantity=${shown}
+            evaluation=${evaluation}
+            isSaid=${isSaid}
+          />`,
+      )
+    } <${Remarks} warnings=${warnings} />`;
 }

@@ -1,11 +1,21 @@
 // One ground motion: its samples and its response spectrum, what is known of it, what uses it.
 import { go, link, setQuery } from "../address.js";
-import { ask, get, save } from "../api.js";
+import { ask, get } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { Button, Choice, Headlines, Loaded, Menu, Panel } from "../ui/controls.js";
+import {
+  Button,
+  Choice,
+  Facts,
+  Headlines,
+  Loaded,
+  Menu,
+  optionsOf,
+  Panel,
+} from "../ui/controls.js";
+import { save } from "../ui/files.js";
 import { pageOf } from "../ui/page.js";
 import { html, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { moment, number, pretty, quantity, title } from "../units.js";
 
 const POINTS = 1500; // buckets of a view, some 60 kB
@@ -116,7 +126,7 @@ function Spectrum({ name, query }) {
       />
       <${Choice}
         label="Damping ratio"
-        options=${RATIOS.map((value) => ({ value, label: `${100 * value} %` }))}
+        options=${optionsOf(RATIOS, (value) => `${100 * value} %`)}
         value=${ratio}
         onChange=${(value) => {
           setRatio(value);
@@ -139,7 +149,7 @@ function Spectrum({ name, query }) {
   <//>`;
 }
 
-function Facts({ record }) {
+function RecordFacts({ record }) {
   const { earthquake, station, source, processing, notes, layout, author, header } = record;
   const { created, digest, used_by: used } = record;
   const unit = pretty(record.stated_unit ?? record.unit);
@@ -149,13 +159,7 @@ function Facts({ record }) {
     .filter(([, value]) => value !== null && typeof value !== "object")
     .map(([key, value]) => [title(key), number(value)]);
   return html`<${Panel} title="What is known of it" help="Ground motions">
-    <dl class="list">
-      ${facts.map(
-        ([key, value]) =>
-          html`<dt>${key}</dt>
-            <dd>${value}</dd>`,
-      )}
-    </dl>
+    <${Facts} pairs=${facts} />
   <//>`;
 }
 
@@ -200,7 +204,7 @@ function Record({ record, query }) {
             <${Spectrum} name=${name} query=${query} />`
         }
       </div>
-      <${Facts} record=${record} />
+      <${RecordFacts} record=${record} />
     </div>`;
 }
 

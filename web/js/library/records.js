@@ -2,10 +2,9 @@
 import { go, link } from "../address.js";
 import { get, post } from "../api.js";
 import { Help, Loaded, Panel } from "../ui/controls.js";
-import { freshId } from "../ui/ids.js";
+import { useId, useLoaded } from "../ui/hooks.js";
 import { pageOf } from "../ui/page.js";
-import { html, useRef } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { html } from "../ui/preact.js";
 import { Table } from "../ui/table.js";
 import { SchemaForm, widgetOf } from "./schema_form.js";
 
@@ -47,22 +46,16 @@ const UPLOAD = {
 };
 
 function FileField({ pointer, label, draft }) {
-  const id = useRef(null);
-  id.current ??= freshId("file");
+  const id = useId("file");
   const choose = (event) => {
     const [file] = event.currentTarget.files;
     draft.set(pointer, file);
     draft.set("/name", file?.name.replace(/\.\w*$/, "").replace(/\W+/g, "_"));
   };
   return html`<div class="field">
-    <label for=${id.current}>${label}</label>
-    <input
-      type="file"
-      id=${id.current}
-      aria-describedby=${`${id.current}-hint`}
-      onChange=${choose}
-    />
-    <p class="hint at-value" id=${`${id.current}-hint`}>
+    <label for=${id}>${label}</label>
+    <input type="file" id=${id} aria-describedby=${`${id}-hint`} onChange=${choose} />
+    <p class="hint at-value" id=${`${id}-hint`}>
       PEER's AT2, times with accelerations, or one column
     </p>
   </div>`;

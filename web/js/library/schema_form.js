@@ -2,12 +2,11 @@
 import { replace } from "../address.js";
 import { post, schema as schemaNamed } from "../api.js";
 import { makeDraft, useNews } from "../form/draft.js";
+import { FaultList } from "../form/fault_list.js";
 import { focusField, Form } from "../form/form.js";
-import { place } from "../scene/inputs.js";
-import { Failure, faultText, Loaded, Notice } from "../ui/controls.js";
+import { Failure, Loaded, Notice } from "../ui/controls.js";
 import { html, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
-import { title } from "../units.js";
+import { useLoaded } from "../ui/hooks.js";
 import { Differences, materialPath, readMaterial } from "./format.js";
 
 // A component as a widget of a form: drawn again with each of the draft's news.
@@ -29,22 +28,16 @@ export function Fields({ schema, draft, onReady, ...options }) {
 }
 
 // The faults of a refusal, each with a button to its field.
-export function Refusal({ error, onGo }) {
+export function Faults({ error, onGo }) {
   const { title: heading, errors = [] } = error;
   if (!errors.some(({ pointer }) => pointer)) return html`<${Failure} error=${error} />`;
-  return html`<div class="notice bad" role="alert">
-    <strong>${heading}</strong>
-    <ul>
-      ${errors.map(
-        (fault) =>
-          html`<li>
-            <button type="button" class="quiet" onClick=${() => onGo(fault.pointer)}>
-              ${title(place(fault.pointer || "/form"))}</button
-            >${` ${faultText(fault)}`}
-          </li>`,
-      )}
-    </ul>
-  </div>`;
+  return html`<${FaultList}
+    heading=${heading}
+    faults=${errors}
+    whole="form"
+    onGo=${onGo}
+    role="alert"
+  />`;
 }
 
 // Marks the faults of a refusal at their fields.
@@ -57,8 +50,8 @@ const focusFault = (box) =>
 
 // A form by a schema: send(value) when it is submitted; what it rejects with is shown, as is what it returns (a view).
 // `isFocused` gives the button the focus. Further options are Form's.
-export function SchemaForm({ schema, value, label, send, isFocused, signal, ...options }) {
-  const draft = useMemo(() => makeDraft(structuredClone(value), signal), []);
+export function SchemaForm({ schema, value, label, send, isFocused, ...options }) {
+  const draft = useMemo(() => makeDraft(structuredClone(value)), []);
   const box = useRef(null);
   const isSending = useRef(false);
   const [outcome, setOutcome] = useState(null);
@@ -73,7 +66,7 @@ export function SchemaForm({ schema, value, label, send, isFocused, signal, ...o
     } catch (error) {
       if (error.name === "AbortError") return;
       markFaults(draft, error);
-      setOutcome(html`<${Refusal} error=${error} onGo=${goTo} />`);
+      setOutcome(html`<${Faults} error=${error} onGo=${goTo} />`);
       focusFault(box.current);
     } finally {
       isSending.current = false;

@@ -1,7 +1,7 @@
 // A force trace of a drop test: read from a text file, drawn with the contacts that the service found and the pulses that fit.
 import { Chart } from "../chart/chart.js";
-import { faultText } from "../ui/controls.js";
-import { freshId } from "../ui/ids.js";
+import { faultText, FileInput } from "../ui/controls.js";
+import { useId } from "../ui/hooks.js";
 import { numberRows } from "../ui/number_rows.js";
 import { html, useRef } from "../ui/preact.js";
 import { number, pretty, quantity, words } from "../units.js";
@@ -86,8 +86,7 @@ function TraceChart({ trace, number: count, evaluation }) {
 }
 
 export function TraceField({ pointer, schema, label, draft }) {
-  const id = useRef(null);
-  id.current ??= freshId("trace");
+  const id = useId("trace");
   const place = pointer.replace("/force", "");
   const trace = draft.get(place);
   const count = Number(place.match(/\d+$/)) + 1;
@@ -103,27 +102,18 @@ export function TraceField({ pointer, schema, label, draft }) {
       draft.say(draft.check, [{ pointer, detail: error.message }]);
     }
   };
-  const forget = (event) => {
-    event.currentTarget.value = "";
-  };
   return html`<div class="field">
-      <label for=${id.current}
-        >${label}<span class="unit">${` [${pretty(schema["x-unit"])}]`}</span></label
-      >
-      <input
-        type="file"
-        id=${id.current}
-        aria-describedby=${`${id.current}-hint ${id.current}-fault`}
+      <label for=${id}>${label}<span class="unit">${` [${pretty(schema["x-unit"])}]`}</span></label>
+      <${FileInput}
+        id=${id}
+        aria-describedby=${`${id}-hint ${id}-fault`}
         aria-invalid=${faults.length > 0}
-        onClick=${forget}
         onChange=${read}
       />
-      <p class="hint" id=${`${id.current}-hint`}>
+      <p class="hint" id=${`${id}-hint`}>
         ${`a text file of times in s and forces in N; ${schema.description}`}
       </p>
-      <p class="fault" id=${`${id.current}-fault`}>
-        ${faults.slice(0, 3).map(faultText).join("; ")}
-      </p>
+      <p class="fault" id=${`${id}-fault`}>${faults.slice(0, 3).map(faultText).join("; ")}</p>
     </div>
     ${
       trace?.force &&

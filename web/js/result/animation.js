@@ -1,15 +1,14 @@
 // A result in slow motion. The instant is the address' t, else the start of its impact, else that of the window; while it plays
 // the charts' cursor goes along.
-import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
+import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { cursorOf } from "../chart/cursor.js";
 import { Picture } from "../scene/drawing.js";
-import { useWidth } from "../ui/width.js";
+import { useRedraw, useStore, useWidth } from "../ui/hooks.js";
 import { channelsOf, makeFrames } from "../scene/frames.js";
 import { layoutOf } from "../scene/layout.js";
 import { limit, modelOf } from "../scene/model.js";
 import { settings } from "../settings.js";
 import { Failure, Figures, IconButton } from "../ui/controls.js";
-import { useStore } from "../ui/store.js";
 import { quantity } from "../units.js";
 import { channelNames, useResult, windowOf } from "./context.js";
 import { FilmTools } from "./film_tools.js";
@@ -211,7 +210,7 @@ export function Animation() {
   const units = useStore(settings);
   const box = useRef(null);
   const width = useWidth(box, 240, 720);
-  const [, redraw] = useReducer((count) => count + 1, 0);
+  const redraw = useRedraw();
   const [error, setError] = useState(null);
   const [pace, setPace] = useState(() => usualPace(result));
   const [isLooped, setIsLooped] = useState(false);

@@ -1,9 +1,9 @@
 // "Compare with …": the same scene with one thing changed is run, and both results are shown beside each other.
 import { go, link } from "../address.js";
-import { follow, get, submit } from "../api.js";
+import { get, runScene } from "../api.js";
 import { Button, Failure, Loaded, Menu } from "../ui/controls.js";
 import { html, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 
 const MAX_MATERIALS = 30;
 
@@ -69,13 +69,9 @@ export function CompareMenu({ result }) {
   const run = async ({ label, change }) => {
     setState({ running: label });
     try {
-      const job = await submit(change(plain(scene)));
-      const end = job.finished ? job : await follow(job, () => {});
-      if (end.status !== "successful")
-        throw Object.assign(new Error("The run failed"), end.problem);
-      go("compare", { a: id, b: end.result });
+      go("compare", { a: id, b: await runScene(change(plain(scene))) });
     } catch (error) {
-      if (error.name !== "AbortError") setState({ error });
+      setState({ error });
     }
   };
   if (state.running)

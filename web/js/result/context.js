@@ -1,9 +1,10 @@
 // What all parts of a result's page share: the result, its impacts, the view that the address holds, and how to change it.
-import { setQuery, read } from "../address.js";
 import { get } from "../api.js";
-import { createContext, useContext, useMemo, useState } from "../ui/preact.js";
-import { createStore } from "../ui/store.js";
-import { Ledger } from "./ledger.js";
+import { useQuery } from "../ui/hooks.js";
+import { createContext, useContext, useMemo } from "../ui/preact.js";
+import { createStore } from "../store.js";
+import { channelNamer } from "../scene/channels.js";
+import { makeLedger } from "./ledger.js";
 
 export const ResultContext = createContext(null);
 export const useResult = () => useContext(ResultContext);
@@ -16,16 +17,12 @@ export async function jobsOf(id, signal) {
 // {result, path, query, change, ledger, jobs (a promise of the latest), signal}: `query` is the address as it is now; change()
 // writes to it, and what shows the context is drawn again. `shown` is a store of the part of the time that charts show, null is all.
 export function useResultContext(result, signal, jobs) {
-  const [, redraw] = useState(0);
   const path = `v1/results/${result.id}`;
-  const kept = useMemo(() => {
-    return { ledger: new Ledger({ path, result }), shown: createStore(null) };
-  }, [result.id]);
-  const change = (changes, push = false) => {
-    setQuery(changes, push);
-    redraw((count) => count + 1);
-  };
-  return { result, path, query: read().query, change, signal, jobs, ...kept };
+  const kept = useMemo(
+    () => ({ ledger: makeLedger(path, result), shown: createStore(null) }),
+    [result.id],
+  );
+  return { result, path, ...useQuery(), signal, jobs, ...kept };
 }
 
 // The window of time in view: {from, to, end}; the whole unless the query says otherwise.
@@ -40,16 +37,7 @@ export function windowOf(result, query) {
   return from < to ? { from, to, end } : { from: 0, to: end, end };
 }
 
-// Names of channels: with several storeys or dampers each has its number.
-export function channelNames({ scene, channels }) {
-  const storeys = [scene.structure.masses ?? scene.structure.mass].flat().length;
-  const { dampers } = scene;
-  const isNumbered = storeys > 1 || dampers.length > 1;
-  const name = (word, number) => (isNumbered ? `${word}_${number}` : word);
-  return {
-    storeys,
-    has: (channel) => channels.includes(channel),
-    ofStorey: (word, number) => name(word, number),
-    ofDamper: (word, number) => name(word, number),
-  };
-}
+export const channelNames = ({ scene, channels }) => ({
+  has: (channel) => channels.includes(channel),
+  of: channelNamer(scene),
+});

@@ -2,10 +2,9 @@
 import { html } from "../ui/preact.js";
 import { get } from "../api.js";
 import { Loaded } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
-import { title } from "../units.js";
-import { share } from "./headlines.js";
+import { share, title } from "../units.js";
 import { useResult } from "./context.js";
 
 // Whether the service counts what comes or what goes; each part goes on where the last one ended.

@@ -1,6 +1,7 @@
 // What a reader takes along: files in every format, and lines that run this scene elsewhere.
 import { html } from "../ui/preact.js";
-import { address, save } from "../api.js";
+import { address } from "../api.js";
+import { save } from "../ui/files.js";
 import { CodeBlock, Figures } from "../ui/controls.js";
 import { title } from "../units.js";
 import { useResult } from "./context.js";

@@ -32,10 +32,9 @@ export function FilmTools({ scene, frame, frameAt, window, t, pace, signal }) {
     setError(null);
     setProgress(0);
     try {
-      const first = start;
       await saveFilm(scene, {
         seconds,
-        frameAt: (second) => frameAt(Math.min(window.to, first + second / pace)),
+        frameAt: (second) => frameAt(Math.min(window.to, start + second / pace)),
         name: "motion",
         onProgress: setProgress,
         signal: stop.current.signal,

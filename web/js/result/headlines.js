@@ -1,12 +1,8 @@
 // The six numbers that a result is opened for: the damper's effect, impacts, the largest force, how exact it is.
 import { html } from "../ui/preact.js";
 import { Headlines } from "../ui/controls.js";
-import { number, quantity } from "../units.js";
+import { number, quantity, share } from "../units.js";
 import { useResult } from "./context.js";
-
-// "12.3 %"; what is next to nothing as a power of ten.
-export const share = (part, digits = 3) =>
-  part !== 0 && Math.abs(part) < 1e-5 ? `${number(part, 2)}` : `${number(100 * part, digits)} %`;
 
 // A metric with and without the damper: reductions are relative to the structure alone.
 function effect(label, summary, units, name, place) {

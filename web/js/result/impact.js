@@ -3,9 +3,8 @@ import { html } from "../ui/preact.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Help, IconButton, Loaded } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
-import { number, quantity } from "../units.js";
-import { share } from "./headlines.js";
+import { useLoaded } from "../ui/hooks.js";
+import { number, quantity, share } from "../units.js";
 import { useResult, windowOf } from "./context.js";
 
 const FACTS = [

@@ -1,7 +1,7 @@
 // The impacts in the window of time as a table; a click shows one at full detail.
 import { html } from "../ui/preact.js";
 import { Loaded } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
 import { number } from "../units.js";
 import { useResult, windowOf } from "./context.js";

@@ -1,12 +1,12 @@
 // A measured motion over a result: shifted in time, compared over time and in the spectrum. In
 // the address: measured (the channel), shift (s).
 import { html, useMemo, useState } from "../ui/preact.js";
-import { ask, post } from "../api.js";
+import { ask, post, wait } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { bandDifferences, bandSeries, bandText, furthestBand } from "../runs/bands.js";
-import { readNpy, timeOfEnergy, differenceOf } from "./series.js";
-import { Button, Choice, Failure, Loaded, Notice } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { differenceOf, quietTime, readNpy, windowChanges } from "./series.js";
+import { Button, Choice, Failure, Loaded, Notice, optionsOf } from "../ui/controls.js";
+import { useLoaded } from "../ui/hooks.js";
 import { number, pretty, quantity, title, words } from "../units.js";
 import { useResult, windowOf } from "./context.js";
 import { readMeasured, VALUE_UNITS } from "./measured_file.js";
@@ -94,8 +94,8 @@ function Measured({ file }) {
     async (signal) => {
       if (!isShown || found.isLoading) return null;
       if (found.data?.shift === shift) return found.data;
-      await new Promise((resolve) => setTimeout(resolve, PAUSE));
-      return signal.aborted ? null : compareMeasured(result, channel, measured, shift, signal);
+      await wait(PAUSE, signal);
+      return compareMeasured(result, channel, measured, shift, signal);
     },
     [found, shift],
   );
@@ -111,7 +111,7 @@ function Measured({ file }) {
       >
       <${Choice}
         label="Compared with"
-        options=${channels.map((value) => ({ value, label: words(value) }))}
+        options=${optionsOf(channels)}
         value=${channel}
         onChange=${(value) => change({ measured: value, shift: null }, true)}
       />
@@ -119,7 +119,7 @@ function Measured({ file }) {
         file.unit === null &&
         html`<${Choice}
           label="Unit of the file"
-          options=${units.map((value) => ({ value, label: pretty(value) }))}
+          options=${optionsOf(units, pretty)}
           value=${unit}
           onChange=${setOwnUnit}
         />`
@@ -195,13 +195,9 @@ function Overlay({ series, measured, shift, channel, compared }) {
     </p>`;
   const window = windowOf(result, query);
   const isGiven = query.from !== undefined || query.to !== undefined;
-  const quiet = Math.min(window.end, 1.1 * timeOfEnergy(series.time, series.values));
-  const range =
-    isGiven || !(quiet > 0) ? [window.from, window.to] : [0, Number(quiet.toPrecision(2))];
-  const setRange = (next) => {
-    const ends = (next ?? [0, window.end]).map((end) => Number(end.toPrecision(8)));
-    change({ from: ends[0], to: ends[1] }, true);
-  };
+  const quiet = quietTime([series], window.end);
+  const range = isGiven || !quiet ? [window.from, window.to] : [0, quiet];
+  const setRange = (next) => change(windowChanges(next, quiet, window.end), true);
   const x = { label: "Time", unit: "s", domain: [0, window.end] };
   const color = quantityColor(channel);
   const shared = { x, range, onRange: setRange, group: "time" };

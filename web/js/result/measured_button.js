@@ -1,7 +1,8 @@
 // Measured data brought to a result: chosen with a button or dropped on the page. What shows them is loaded when there are some.
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
-import { Button, IconButton, Loaded, Panel } from "../ui/controls.js";
-import { createStore, useLoaded, useStore } from "../ui/store.js";
+import { Button, FileInput, IconButton, Loaded, Panel } from "../ui/controls.js";
+import { useLoaded, useStore } from "../ui/hooks.js";
+import { createStore } from "../store.js";
 
 const KEY = "impactd.measured.";
 const stores = new Map(); // by the result: {name, text} or null
@@ -52,11 +53,6 @@ function useDrop(id) {
   return isOver;
 }
 
-// The same file may be chosen again.
-function forgetChoice(event) {
-  event.currentTarget.value = "";
-}
-
 export function MeasuredButton({ id }) {
   const input = useRef(null);
   const isOver = useDrop(id);
@@ -65,12 +61,10 @@ export function MeasuredButton({ id }) {
     if (file) bring(id, file);
   };
   return html`<${Button} onClick=${() => input.current.click()}>Measured data …<//>
-    <input
-      ref=${input}
-      type="file"
+    <${FileInput}
+      inputRef=${input}
       hidden
       accept=".csv,.txt,.dat,.asc,.tsv,text/*"
-      onClick=${forgetChoice}
       onChange=${choose}
     />
     ${isOver && html`<div class="drop-area"><p>Drop a text file of times and values</p></div>`}`;

@@ -2,10 +2,9 @@
 import { html } from "../ui/preact.js";
 import { link } from "../address.js";
 import { Figures, Help } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
-import { number, quantity, title, words } from "../units.js";
-import { share } from "./headlines.js";
+import { number, quantity, share, title, words } from "../units.js";
 import { useResult } from "./context.js";
 
 const DERIVED = [

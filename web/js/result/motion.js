@@ -2,18 +2,18 @@
 // its stops.
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { Chart, MARGIN } from "../chart/chart.js";
+import { wallsOf } from "../chart/marks.js";
 import { Button, Failure, Notice } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { go } from "../address.js";
 import { post } from "../api.js";
 import { number, quantity, title, words } from "../units.js";
 import { useBare } from "./bare.js";
 import { channelNames, useResult, windowOf } from "./context.js";
-import { isWhole, seriesOf, timeOfEnergy, useSeries } from "./series.js";
+import { isWhole, quietTime, seriesOf, useSeries, windowChanges, wordOf } from "./series.js";
 
 const MAX_MARKERS = 300;
 const MAX_LINES = 4; // of one chart
-const QUIET_PART = 0.7; // where the motion dies before this part of the run, only that much is shown at first
 
 // One colour for each quantity, from the drawing to the legend: variables of style.css.
 export const quantityColor = (channel) =>
@@ -30,9 +30,7 @@ export const quantityColor = (channel) =>
     penetration: "penetration",
     base_shear: "shear",
     storey_drift: "drift",
-  })[channel.replace(/_\d+$/, "")] ?? "accent";
-
-const wordOf = (channel) => channel.replace(/_\d+$/, "");
+  })[wordOf(channel)] ?? "accent";
 
 // Whose channel it is: "storey 2", "damper 1".
 const ownerOf = (channel) =>
@@ -52,8 +50,8 @@ function chartsOf(result) {
   };
   add("displacement");
   scene.dampers.forEach((damper, index) => {
-    const own = names.ofDamper("damper_displacement", index + 1);
-    const carrier = names.ofStorey("displacement", damper.storey);
+    const own = names.of("damper_displacement", index + 1);
+    const carrier = names.of("displacement", damper.storey);
     if (!names.has(own) || !names.has(carrier)) return;
     const which = scene.dampers.length > 1 ? ` ${index + 1}` : "";
     charts.push({
@@ -81,14 +79,6 @@ const usual = (charts, result) =>
         (key === "contact_force" && !isImpulse(result)),
     )
     .map(({ key }) => key);
-
-// The walls of a damper's cavity as the free mass' middle meets them.
-function walls({ clearance, offset }) {
-  return [
-    { y: offset - clearance / 2, label: "left stop", color: "wall" },
-    { y: offset + clearance / 2, label: "right stop", color: "wall" },
-  ];
-}
 
 // Peaks of contacts that are too short for the samples to show them.
 const SHORT = 5; // sample intervals
@@ -175,19 +165,11 @@ export function Motion({ onDrawn }) {
   const quiet = useMemo(() => {
     const column = loaded.data?.columns.get(channels[0]);
     if (!column?.values || result.count > column.values.length) return null;
-    const until = timeOfEnergy(loaded.data.time, column.values) * 1.1;
-    const isQuiet = until > 0 && until < QUIET_PART * window.end;
-    return isQuiet ? Number(until.toPrecision(2)) : null;
+    return quietTime([{ time: loaded.data.time, values: column.values }], window.end);
   }, [loaded.data]);
   const range = isAuto ? quiet && [0, quiet] : [window.from, window.to];
   useEffect(() => context.shown.set(range), [range?.[0], range?.[1]]);
-  const setRange = (next) =>
-    change(
-      next
-        ? { from: trimmed(next[0]), to: trimmed(next[1]) }
-        : { from: quiet ? 0 : null, to: quiet ? window.end : null },
-      true,
-    );
+  const setRange = (next) => change(windowChanges(next, quiet, window.end), true);
 
   const horizon = result.summary.trust_horizon;
   const spans =
@@ -256,7 +238,7 @@ export function Motion({ onDrawn }) {
           group="time"
           isCompact=${!isLast}
           spans=${at === 0 ? spans : unlabelled}
-          rules=${[...rules, ...(chart.damper ? walls(chart.damper) : [])]}
+          rules=${[...rules, ...(chart.damper ? wallsOf(chart.damper) : [])]}
           markers=${at === 0 ? markers : []}
           underlay=${chart.damper && !isImpulse(result) ? buffers(chart.damper) : null}
         />`;
@@ -281,7 +263,6 @@ export function Motion({ onDrawn }) {
   </section>`;
 }
 
-const trimmed = (value) => Number(value.toPrecision(8));
 function toggled(charts, shown, key) {
   const keys = new Set(shown.map((one) => one.key));
   if (!keys.delete(key)) keys.add(key);

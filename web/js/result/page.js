@@ -5,7 +5,7 @@ import { get } from "../api.js";
 import { sceneName } from "../runs/scene_name.js";
 import { Failure, Loaded, withSubscripts } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { jobsOf } from "./context.js";
 import { ResultView } from "./view.js";
 

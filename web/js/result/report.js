@@ -3,7 +3,7 @@ import { html } from "../ui/preact.js";
 import { link } from "../address.js";
 import { get, schema as schemaNamed } from "../api.js";
 import { Button, Loaded, sentence, withSubscripts } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { pageOf } from "../ui/page.js";
 import { Table } from "../ui/table.js";
 import { inputsOf, place, unitAt } from "../scene/inputs.js";

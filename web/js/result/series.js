@@ -1,7 +1,7 @@
 // The motion of a result in a window of time: every sample while there are few enough to draw, else the least and the largest
 // of buckets, one for each device pixel.
 import { ask, get } from "../api.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 
 export const MAX_SAMPLES = 50000;
 
@@ -24,17 +24,19 @@ export async function loadSeries({ path, result, channels, window, pixels, signa
   }
   const query = { channels: names, from: window.from, to: window.to, points: pixels };
   const series = await get(`${path}/series.json`, query, signal);
-  const { start, bucket = 1 } = series;
-  const time = Float64Array.from(
-    { length: series.count },
-    (_, k) => start + ((k + 0.5) * bucket - 0.5) / rate,
-  );
-  const column = (channel) => {
-    const { values, min, max } = series.channels[channel];
-    return values ? { values } : { low: min, high: max };
-  };
-  const found = new Map(channels.map((channel) => [channel, column(channel)]));
-  return { time, columns: found, isEnvelope: bucket > 1, bucket };
+  const { bucket = 1 } = series;
+  const found = new Map(channels.map((channel) => [channel, columnOf(series, channel)]));
+  return { time: timesOf(series), columns: found, isEnvelope: bucket > 1, bucket };
+}
+
+// The instants of a series in JSON, of buckets the middles.
+export const timesOf = ({ start, count, bucket = 1, sample_rate: rate }) =>
+  Float64Array.from({ length: count }, (_, k) => start + ((k + 0.5) * bucket - 0.5) / rate);
+
+// {values}, or of buckets {low, high}.
+export function columnOf({ channels, bucket = 1 }, channel) {
+  const { values, min, max } = channels[channel];
+  return values || bucket === 1 ? { values: values ?? min } : { low: min, high: max };
 }
 
 // The same as the state of a view.
@@ -53,8 +55,11 @@ export const seriesOf = (label, color, time, column, more) =>
     ? { kind: "line", label, color, x: time, y: column.values, ...more }
     : { kind: "band", label, color, x: time, low: column.low, high: column.high, ...more };
 
+// "displacement" of "displacement_2".
+export const wordOf = (channel) => channel.replace(/_\d+$/, "");
+
 // The time by which this part of a motion's sum of squares has passed: where there is something to see.
-export function timeOfEnergy(time, values, part = 0.9995) {
+function timeOfEnergy(time, values, part = 0.9995) {
   let total = 0;
   for (const value of values) total += value * value;
   let sum = 0;
@@ -63,6 +68,25 @@ export function timeOfEnergy(time, values, part = 0.9995) {
     if (sum >= part * total) return time[at];
   }
   return time[time.length - 1];
+}
+
+const QUIET_PART = 0.7;
+
+// Until when motions [{time, values}] are shown at first: as long as they hold energy; null where that is most of the run, whose
+// `end` stands for a motion without values.
+export function quietTime(motions, end) {
+  const times = motions.map(({ time, values }) =>
+    values ? 1.1 * timeOfEnergy(time, values) : end,
+  );
+  const until = Math.max(0, ...times);
+  return until > 0 && until < QUIET_PART * end ? Number(until.toPrecision(2)) : null;
+}
+
+// What the address has of a chosen part of the time. The whole, null, is named only where less is shown at first.
+export function windowChanges(range, quiet, end) {
+  const whole = quiet ? [0, end] : [null, null];
+  const [from, to] = range?.map((value) => Number(value.toPrecision(8))) ?? whole;
+  return { from, to };
 }
 
 export function readNpy(buffer) {

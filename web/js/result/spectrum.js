@@ -3,8 +3,8 @@
 import { html, useMemo } from "../ui/preact.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { Choice, Loaded } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { Choice, Loaded, optionsOf } from "../ui/controls.js";
+import { useLoaded } from "../ui/hooks.js";
 import { latestResults } from "../runs/names.js";
 import { number, pretty, words } from "../units.js";
 import { useResult } from "./context.js";
@@ -54,17 +54,13 @@ export function Spectrum() {
   if (!hasPsd) return html`<p>The scene asked for no spectrum.</p>`;
   return html`<${Loaded} loaded=${own}>
     ${(psd) =>
-      html`<${SpectrumChart}
-        psd=${psd}
-        names=${names.data ?? NO_NAMES}
-        ids=${ids}
-        others=${others.data ?? NONE}
-      />`}
+      html`<${SpectrumChart} psd=${psd} names=${names} ids=${ids} others=${others.data ?? NONE} />`}
   <//>`;
 }
 
 function SpectrumChart({ psd, names, ids, others }) {
   const { result, query, change } = useResult();
+  const known = names.data ?? NO_NAMES;
   const channels = Object.keys(psd.channels);
   const channel = channels.includes(query.psd) ? query.psd : channels[0];
   const isSmooth = query.smooth === "1";
@@ -78,10 +74,10 @@ function SpectrumChart({ psd, names, ids, others }) {
       [psd, ...others].map((run, at) => {
         const x = run?.frequency.values ?? [];
         const y = run?.channels[channel]?.values ?? [];
-        const label = at === 0 ? "this result" : (names.get(ids[at - 1]) ?? "another");
+        const label = at === 0 ? "this result" : (known.get(ids[at - 1]) ?? "another");
         return { label, color: `c${at + 1}`, x, y: isSmooth ? thirdOctaves(x, y) : y };
       }),
-    [psd, others, names, channel, isSmooth],
+    [psd, others, known, channel, isSmooth],
   );
   const best = peakOf(series[0], range);
   const { x, y } = series[0];
@@ -93,13 +89,13 @@ function SpectrumChart({ psd, names, ids, others }) {
     const next = ids.includes(id) ? ids.filter((one) => one !== id) : [...ids, id];
     change({ overlay: next.join() || null }, true);
   };
-  const choices = [...names].filter(([id]) => id !== result.id);
+  const choices = [...known].filter(([id]) => id !== result.id);
   return html`<div class="row">
       ${
         channels.length > 1 &&
         html`<${Choice}
           label="Channel"
-          options=${channels.map((value) => ({ value, label: words(value) }))}
+          options=${optionsOf(channels)}
           value=${channel}
           onChange=${(value) => change({ psd: value }, true)}
         />`

@@ -1,8 +1,8 @@
 // Studies that begin from a result: what is asked, what it costs, and the way to its answer.
-import { html, useState } from "../ui/preact.js";
-import { go } from "../address.js";
+import { html } from "../ui/preact.js";
 import { check, submit } from "../api.js";
 import { Button, Failure, Menu } from "../ui/controls.js";
+import { JobButton } from "../study/parts.js";
 import { quantity } from "../units.js";
 
 const SWEEP_POINTS = 58;
@@ -68,19 +68,13 @@ export function StudyButtons({ scene, onChoose }) {
 }
 
 export function StudyStart({ scene, chosen, onClose }) {
-  const [isSent, setIsSent] = useState(false);
   const { study, body, cost, error } = chosen;
   if (error) return html`<${Failure} error=${error} />`;
-  const start = async () => {
-    setIsSent(true);
-    const job = await submit(body);
-    go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`);
-  };
   return html`<div class="notice study-start" role="status">
     <span
       >${`${study.text(scene)}: about ${quantity(cost.cpu_seconds, "s", 2)} of processor time.`}</span
     >
-    <${Button} isPrimary disabled=${isSent} onClick=${start}>Start<//>
+    <${JobButton} isPrimary label="Start" make=${() => submit(body)} />
     <${Button} isQuiet onClick=${onClose}>Not now<//>
   </div>`;
 }

@@ -5,26 +5,23 @@ import { announce } from "../ui/announce.js";
 import { Button } from "../ui/controls.js";
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
 import { number } from "../units.js";
-
-const MAX_COMPARED = 4;
-const LETTERS = ["a", "b", "c", "d"];
+import { LETTERS, lettered } from "./names.js";
 
 const count = (number) => (number === 1 ? "1 run" : `${number} runs`);
 const resultsOf = (rows) => [
   ...new Set(rows.filter((row) => row.result && !row.result_deleted).map((row) => row.result)),
 ];
 
-const comparisonLink = (results) =>
-  link("compare", Object.fromEntries(results.map((id, at) => [LETTERS[at], id])));
-
 function CompareLink({ rows }) {
   const results = resultsOf(rows);
-  if (results.length >= 2 && results.length <= MAX_COMPARED)
-    return html`<a class="button primary" href=${comparisonLink(results.reverse())}>Compare</a>`;
+  if (results.length >= 2 && results.length <= LETTERS.length)
+    return html`<a class="button primary" href=${link("compare", lettered(results.reverse()))}
+      >Compare</a
+    >`;
   return html`<button
     type="button"
     disabled
-    title=${`Choose 2 to ${MAX_COMPARED} runs with results`}
+    title=${`Choose 2 to ${LETTERS.length} runs with results`}
   >
     Compare
   </button>`;

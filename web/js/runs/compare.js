@@ -1,13 +1,13 @@
 // Up to four results beside each other. In the address: a to d (results), and what comparison.js keeps there.
-import { go, link, setQuery, read, replace } from "../address.js";
-import { follow, get, schema as schemaNamed, submit } from "../api.js";
+import { go, link, read, replace } from "../address.js";
+import { get, runScene, schema as schemaNamed } from "../api.js";
 import { Button, Failure, Help, IconButton, Loaded } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
-import { html, useEffect, useReducer, useRef } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
-import { brief } from "../units.js";
+import { html, useEffect, useRef } from "../ui/preact.js";
+import { useLoaded, useQuery } from "../ui/hooks.js";
+import { brief, uncapital } from "../units.js";
 import { Comparison } from "./comparison.js";
-import { differingNames, isSame, latestResults } from "./names.js";
+import { differingNames, isSame, latestResults, LETTERS, lettered } from "./names.js";
 import { inputsOf } from "../scene/inputs.js";
 import { materialOf, valueText } from "./scene_name.js";
 
@@ -21,18 +21,11 @@ const PAIRS = [
   },
 ];
 
-// Runs scenes to their ends; the ids of their results.
-async function runAll(scenes) {
-  const jobs = await Promise.all(scenes.map(submit));
-  const ends = await Promise.all(jobs.map((job) => (job.finished ? job : follow(job, () => {}))));
-  const failed = ends.find((job) => job.status !== "successful");
-  if (failed) throw Object.assign(new Error("A run failed"), failed.problem);
-  return ends.map((job) => job.result);
-}
+const idsOf = (query) => LETTERS.map((letter) => query[letter]).filter(Boolean);
 
 const runPair = async (examples) => {
   const scenes = await Promise.all(examples.map((name) => get(`v1/examples/${name}`)));
-  go("compare", lettered(await runAll(scenes)));
+  go("compare", lettered(await Promise.all(scenes.map(runScene))));
 };
 
 // What the paper compares, run with one click.
@@ -49,7 +42,7 @@ function Chosen({ ids, labels, names }) {
   const others = [...names].filter(([id]) => !ids.includes(id));
   return html`<div class="compared">
     ${ids.map((id, at) => {
-      const label = labels[at] ?? `${"ABCD"[at]} ${brief(id)}`;
+      const label = labels[at] ?? `${LETTERS[at].toUpperCase()} ${brief(id)}`;
       return html`<span class="compared-run" style=${{ "--ink": `var(--c${at + 1})` }}>
         <span class="swatch"></span>
         <a href=${link(`results/${id}`)} title=${names.get(id)}>${label}</a>
@@ -76,18 +69,13 @@ function Chosen({ ids, labels, names }) {
 }
 
 function ComparePage({ address }) {
-  const [, redraw] = useReducer((count) => count + 1, 0);
-  const { query } = read();
+  const { query, change } = useQuery();
   const ids = idsOf(query);
   const known = useLoaded(() => latestResults(LATEST), [ids.join()]);
   const loaded = useLoaded(
     (signal) => (ids.length > 1 ? loadComparison(ids, signal) : { runs: [] }),
     [ids.join()],
   );
-  const change = (changes, push) => {
-    setQuery(changes, push);
-    redraw();
-  };
   // Without any named the last two are compared.
   useEffect(() => {
     const [b, a] = known.data?.keys() ?? [];
@@ -116,12 +104,6 @@ function ComparePage({ address }) {
 }
 
 export const page = pageOf(() => "Compare", ComparePage);
-
-const LETTERS = [..."abcd"];
-const idsOf = (query) => LETTERS.map((letter) => query[letter]).filter(Boolean);
-// The address' query of these results.
-const lettered = (ids) =>
-  Object.fromEntries(LETTERS.map((letter, at) => [letter, ids[at] ?? null]));
 
 async function loadRun(id, signal) {
   const load = (name, query) => get(`v1/results/${encodeURIComponent(id)}${name}`, query, signal);
@@ -156,15 +138,15 @@ async function loadComparison(ids, signal) {
   );
   const scenes = runs.map(({ result }) => result.scene);
   const names = differingNames(
-    scenes.map((scene, at) => ({ scene, title: "ABCD"[at] })),
+    scenes.map((scene, at) => ({ scene, title: LETTERS[at].toUpperCase() })),
     schema,
     2,
   );
-  const lower = (name) => (name ?? "").replace(/^./, (letter) => letter.toLowerCase());
   runs.forEach((run, at) =>
     Object.assign(run, {
       color: `c${at + 1}`,
-      label: `${"ABCD"[at]} ${lower(names[at] ?? materialOf(scenes[at]))}`.trim(),
+      label:
+        `${LETTERS[at].toUpperCase()} ${uncapital(names[at] ?? materialOf(scenes[at]))}`.trim(),
     }),
   );
   return { runs, pairs, inputs: differingInputs(scenes, schema) };

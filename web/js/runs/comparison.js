@@ -2,15 +2,17 @@
 // impacts. In the address: channel, from, to.
 import { html, useMemo } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
-import { Choice, Failure, Panel } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
+import { Choice, Failure, optionsOf, Panel } from "../ui/controls.js";
+import { useLoaded } from "../ui/hooks.js";
 import {
   isWhole,
   loadSeries,
   MAX_SAMPLES,
   seriesOf,
-  timeOfEnergy,
+  quietTime,
   differenceOf,
+  windowChanges,
+  wordOf,
 } from "../result/series.js";
 import { capital, metricOf, number, quantity, readable, title, words } from "../units.js";
 import { bandDifferences, bandSeries, bandText, furthestBand } from "./bands.js";
@@ -18,7 +20,6 @@ import { ComparisonTable, FirstImpacts, Pushes } from "./comparison_table.js";
 import { isSame } from "./names.js";
 
 const PIXELS = 1600; // buckets of a long series
-const QUIET_PART = 0.7; // motions that die before this part of the run are shown until then
 
 // Which of two pushes harder, and why.
 function pushText(runs) {
@@ -84,8 +85,7 @@ const channelIn = (channels, channel) =>
   channels.includes(channel)
     ? channel
     : channels.findLast(
-        (one) =>
-          /acceleration|^(displacement|velocity)/.test(one) && one.replace(/_\d+$/, "") === channel,
+        (one) => /acceleration|^(displacement|velocity)/.test(one) && wordOf(one) === channel,
       );
 
 // The channels that all have, else those of the top storeys.
@@ -93,7 +93,7 @@ function commonChannels(runs) {
   const lists = runs.map(({ result }) => result.channels);
   const own = lists[0].filter((channel) => lists.every((list) => list.includes(channel)));
   if (own.some((channel) => /^displacement/.test(channel))) return own;
-  const plain = [...new Set(lists[0].map((channel) => channel.replace(/_\d+$/, "")))];
+  const plain = [...new Set(lists[0].map(wordOf))];
   return plain.filter((channel) => lists.every((list) => channelIn(list, channel)));
 }
 
@@ -141,24 +141,17 @@ function Motions({ runs, pairs, query, change }) {
       return { ...(pair.every(Boolean) && differenceOf(...pair)), run: other.run };
     });
     const isNoise = ({ y }) => y && largestOf(y) <= 1e-9 * largestOf(first.column.values);
-    const until = (loaded.data ?? []).map(({ time, column }) =>
-      column.values ? 1.1 * timeOfEnergy(time, column.values) : end,
-    );
-    const last = Math.max(0, ...until);
+    const motions = (loaded.data ?? []).map(({ time, column: { values } }) => ({ time, values }));
     return [
       found.filter((one) => one.x && !isNoise(one)),
       found.length > 0 && found.every(isNoise),
-      last > 0 && last < QUIET_PART * end ? Number(last.toPrecision(2)) : null,
+      quietTime(motions, end),
     ];
   }, [loaded.data]);
   if (channels.length === 0) return html`<p>They have no channel in common.</p>`;
   const isTop = runs.some(({ result }) => !result.channels.includes(channel));
   const range = isGiven ? [window.from, window.to] : quiet && [0, quiet];
-  const setRange = (next) => {
-    const ends = next?.map((value) => Number(value.toPrecision(8)));
-    const whole = { from: quiet ? 0 : null, to: quiet ? end : null };
-    change(ends ? { from: ends[0], to: ends[1] } : whole, true);
-  };
+  const setRange = (next) => change(windowChanges(next, quiet, end), true);
   const isFirst = loaded.data?.[0]?.run === runs[0];
   const unit = runs[0].result.units[channelIn(runs[0].result.channels, channel)];
   const rules = runs.slice(1).flatMap((run, at) => {
@@ -216,7 +209,7 @@ function Motions({ runs, pairs, query, change }) {
 const ChannelChoice = ({ channels, channel, change }) =>
   html`<${Choice}
     label="Channel"
-    options=${channels.map((value) => ({ value, label: words(value) }))}
+    options=${optionsOf(channels)}
     value=${channel}
     onChange=${(value) => change({ channel: value }, true)}
   />`;
@@ -237,7 +230,7 @@ function spectrumText(first, others, pairs) {
 
 function Spectra({ runs, pairs }) {
   const all = Object.keys(runs[0].psd?.channels ?? {});
-  const channel = pairs[0].psd?.[0]?.channel ?? all[0]?.replace(/_\d+$/, "");
+  const channel = pairs[0].psd?.[0]?.channel ?? (all.length > 0 ? wordOf(all[0]) : undefined);
   const densityOf = ({ psd }) => psd?.channels[channelIn(Object.keys(psd.channels), channel)];
   const [first, ...others] = useMemo(
     () =>

@@ -70,6 +70,11 @@ export function namesOf(jobs, schema) {
   return names;
 }
 
+// Results beside each other are called A to D; the address names them by these letters.
+export const LETTERS = [..."abcd"];
+export const lettered = (ids) =>
+  Object.fromEntries(LETTERS.map((letter, at) => [letter, ids[at] ?? null]));
+
 // The latest results by their ids: a name that tells each from the others, and when it ended.
 export async function latestResults(limit) {
   const query = { status: "successful", kind: "none", limit, details: 1 };

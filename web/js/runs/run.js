@@ -1,12 +1,12 @@
 // One run while it goes on: how far it is, how to stop it, why it failed. What came out is the result's page.
-import { link, setQuery, read, replace } from "../address.js";
+import { link, replace } from "../address.js";
 import { follow, get, remove } from "../api.js";
 import { announce } from "../ui/announce.js";
 import { Button, Failure, Loaded, Notice } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { Sweep } from "../study/sweep.js";
-import { html, useEffect, useReducer, useRef, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { html, useEffect, useRef, useState } from "../ui/preact.js";
+import { useLoaded, useQuery } from "../ui/hooks.js";
 import { moment, number, pretty } from "../units.js";
 import { isOpen, StateBadge } from "./actions.js";
 
@@ -23,32 +23,24 @@ function stateText({ status, progress, timing: { run } }) {
 
 // The rows of a sweep as they finish.
 function SweepRows({ job, path }) {
-  const [, redraw] = useReducer((count) => count + 1, 0);
-  const change = (changes, push) => {
-    setQuery(changes, push);
-    redraw();
-  };
+  const address = useQuery();
   if (job.study !== "sweep" || !(job.progress > 5)) return null; // before, its scene alone runs
   return html`<${Sweep}
     path=${`${path}/table.json`}
     points=${0}
     jobId=${job.id}
-    query=${read().query}
-    change=${change}
+    ...${address}
     again=${job.progress}
   />`;
 }
 
-function Run({ first, path, signal }) {
+function Run({ first, path }) {
   const [job, setJob] = useState(first);
   const [error, setError] = useState(null);
   const change = useRef(null);
   const isGoing = isOpen(job);
   useEffect(() => {
-    if (isOpen(first))
-      follow(first, setJob, signal).catch((problem) => {
-        if (problem.name !== "AbortError") setError(problem);
-      });
+    if (isOpen(first)) follow(first, setJob).catch(setError);
   }, []);
   const isDone = job.status === "successful" && !job.result_deleted;
   useEffect(() => {
@@ -85,11 +77,11 @@ function Run({ first, path, signal }) {
     <${SweepRows} job=${job} path=${path} />`;
 }
 
-function RunPage({ address: { path: parts }, signal }) {
+function RunPage({ address: { path: parts } }) {
   const path = `v1/jobs/${encodeURIComponent(parts[1])}`;
-  const loaded = useLoaded((own) => get(path, null, own), [path]);
+  const loaded = useLoaded((signal) => get(path, null, signal), [path]);
   return html`<${Loaded} loaded=${loaded} heading="Run">
-    ${(job) => html`<${Run} first=${job} path=${path} signal=${signal} />`}
+    ${(job) => html`<${Run} first=${job} path=${path} />`}
   <//>`;
 }
 

@@ -1,14 +1,15 @@
 // The runs, newest first: their inputs where these vary, their metrics, what became of each. In the address: q (words), status,
 // kind (of study), sort ("-impacts" downwards), before (a page of older ones).
-import { link, setQuery, read } from "../address.js";
+import { jobPath, link } from "../address.js";
 import { ask, remove, schema as schemaNamed } from "../api.js";
 import { announce } from "../ui/announce.js";
 import { Button, Help, Loaded } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
-import { html, useEffect, useReducer, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { html, useEffect, useState } from "../ui/preact.js";
+import { useCount, useLoaded, useQuery } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
 import { metricOf, moment, title } from "../units.js";
+import { KINDS } from "../study/kinds.js";
 import { Actions, isOpen, StateBadge, STATES } from "./actions.js";
 import { namesOf, varyingInputs } from "./names.js";
 import { valueText } from "./scene_name.js";
@@ -16,18 +17,6 @@ import { valueText } from "./scene_name.js";
 const LIMIT = 100;
 const MAX_INPUTS = 3; // columns of them
 const AGAIN_MS = 1500; // between looks at what goes on
-const KINDS = [
-  "none",
-  "compare",
-  "sensitivity",
-  "tradeoff",
-  "sweep",
-  "ensemble",
-  "optimize",
-  "calibrate",
-  "response",
-  "fragility",
-];
 const METRICS = [
   { key: "rms_displacement", label: "Motion, rms", unit: "m", digits: 4 },
   { key: "peak_displacement", label: "Motion, peak", unit: "m", digits: 4 },
@@ -77,9 +66,6 @@ function useProgress(loaded, query, reload) {
     return isOpen(job) && now ? { ...job, status: now.status, progress: now.progress } : job;
   });
 }
-
-const targetOf = (job) =>
-  job.result && !job.result_deleted ? `results/${job.result}` : `jobs/${job.id}`;
 
 // Of inputs that vary among all rows, and what the shown ones have of the rest.
 function columnsOf(rows, shown, schema, onCancel) {
@@ -143,7 +129,7 @@ const STATE = {
 };
 
 const NameCell = ({ row, onCancel }) =>
-  html`<a id=${row.id} href=${link(targetOf(row))}
+  html`<a id=${row.id} href=${link(jobPath(row))}
       >${row.name}${row.detail && html` <span class="hint subtitle">${row.detail}</span>`}</a
     >
     ${row.labels && html`<span class="hint subtitle">${row.labels.join(", ")}</span>`}
@@ -191,7 +177,13 @@ function Filters({ query, onChange }) {
       values=${Object.keys(STATES)}
       onChange=${onChange}
     />
-    <${Chooser} name="kind" label="Study" query=${query} values=${KINDS} onChange=${onChange} />
+    <${Chooser}
+      name="kind"
+      label="Study"
+      query=${query}
+      values=${["none", ...Object.keys(KINDS)]}
+      onChange=${onChange}
+    />
   </form>`;
 }
 
@@ -229,10 +221,9 @@ function RunsTable({ rows, schema, query, change, chosen, setChosen, onToggle, o
 }
 
 function RunsPage() {
-  const [, redraw] = useReducer((count) => count + 1, 0);
-  const [loads, reload] = useReducer((count) => count + 1, 0);
+  const [loads, reload] = useCount();
   const [chosen, setChosen] = useState(new Set());
-  const { query } = read();
+  const { query, change } = useQuery();
   const { q, status, kind, before } = query;
   const loaded = useLoaded(
     (signal) => loadJobs(query, signal),
@@ -240,10 +231,6 @@ function RunsPage() {
     loads,
   );
   const jobs = useProgress(loaded, { status, kind, before }, reload);
-  const change = (changes) => {
-    setQuery(changes);
-    redraw();
-  };
   const toggle = (row) =>
     setChosen((last) => {
       const next = new Set(last);

@@ -53,11 +53,7 @@ export function Accuracy({ pointer, schema, draft, options }) {
     setProgress(0);
     job.current = submit(JSON.parse(asked));
     try {
-      const now = await follow(
-        await job.current,
-        ({ progress: part }) => setProgress(part ?? 0),
-        draft.signal,
-      );
+      const now = await follow(await job.current, ({ progress: part }) => setProgress(part ?? 0));
       const isDone = now.status === "successful";
       setNews(isDone ? null : (now.problem?.detail ?? "Cancelled: nothing was measured."));
       if (isDone) {
@@ -65,7 +61,7 @@ export function Accuracy({ pointer, schema, draft, options }) {
         setMeasured({ stops, asked, result: now.result });
       }
     } catch (error) {
-      if (error.name !== "AbortError") setNews(html`<${Failure} error=${error} />`);
+      setNews(html`<${Failure} error=${error} />`);
     }
     job.current = null;
     setProgress(null);

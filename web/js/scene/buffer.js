@@ -6,7 +6,7 @@ import { Form } from "../form/form.js";
 import { figure, materialPath, range } from "../library/format.js";
 import { Failure, withSubscripts } from "../ui/controls.js";
 import { html, useMemo, useRef } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { quantity } from "../units.js";
 
 // Numbers of one's own, and what they begin with: the stop as it is now.

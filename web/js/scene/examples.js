@@ -3,16 +3,14 @@ import { link } from "../address.js";
 import { get } from "../api.js";
 import { Loaded, withSubscripts } from "../ui/controls.js";
 import { html, useEffect, useRef } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { capital, pretty, words } from "../units.js";
+import { KINDS } from "../study/kinds.js";
 import { modelOf } from "./model.js";
 
 const GROUPS = [
   ["Li and Darby (2009)", /Li and Darby/],
-  [
-    "Studies",
-    /^(sweep|ensemble|sensitivity|compare|tradeoff|optimize|calibrate|response|fragility)_/,
-  ],
+  ["Studies", new RegExp(`^(${Object.keys(KINDS).join("|")})_`)],
   ["Others", /./],
 ];
 

@@ -1,5 +1,5 @@
 // Pictures of a motion to take along: a frame as PNG, a stretch of time as WebM. They are drawn aside, with all words.
-import { saveBlob, standaloneSvg, svgBlob } from "../ui/files.js";
+import { canvasPng, imageOf, RATIO, saveBlob, standaloneSvg, themeColor } from "../ui/files.js";
 import { html, render } from "../ui/preact.js";
 import { Picture } from "./drawing.js";
 import { layoutOf } from "./layout.js";
@@ -39,7 +39,9 @@ export async function saveFrame(scene, frame, name) {
   const stage = makeStage(scene);
   try {
     stage.draw(frame.state, frame.trail);
-    saveBlob(await framePng(stage.svg(), frame.text), `${name}.png`);
+    const { canvas, paint } = canvasFor(stage.svg());
+    await paint(frame.text);
+    saveBlob(await canvasPng(canvas), `${name}.png`);
   } finally {
     stage.remove();
   }
@@ -56,7 +58,7 @@ export async function saveFilm(scene, { seconds, frameAt, name, onProgress, sign
   };
   try {
     stage.draw({ displacements: [] }, null);
-    const blob = await record({ svg: stage.svg, seconds, pose, onProgress, signal });
+    const blob = await record({ svg: stage.svg(), seconds, pose, onProgress, signal });
     if (blob) saveBlob(blob, `${name}.webm`);
   } finally {
     stage.remove();
@@ -64,67 +66,38 @@ export async function saveFilm(scene, { seconds, frameAt, name, onProgress, sign
 }
 
 const RATE = 30; // frames per second
-const PIXELS = 2; // of the canvas for one of the drawing
 
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 const typeHere = () => TYPES.find((type) => globalThis.MediaRecorder?.isTypeSupported(type));
 export const canRecord = () => Boolean(typeHere());
 
-const colorOf = (node) => getComputedStyle(node).color;
-
-// Paints the SVG element as it is now, with a line of text below it.
-async function paint(context, svg, text, colors) {
-  const { canvas } = context;
-  const copy = standaloneSvg(svg);
-  const url = URL.createObjectURL(svgBlob(copy));
-  try {
-    const image = new Image();
-    image.src = url;
-    await image.decode();
-    context.fillStyle = colors.back;
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    context.drawImage(
-      image,
-      0,
-      0,
-      svg.width.baseVal.value * PIXELS,
-      svg.height.baseVal.value * PIXELS,
-    );
-    context.fillStyle = colors.text;
-    context.font = `${13 * PIXELS}px Inter, sans-serif`;
-    context.fillText(text, 8 * PIXELS, canvas.height - 9 * PIXELS);
-  } finally {
-    URL.revokeObjectURL(url);
-  }
-}
-
-// A canvas of the drawing's size with room for a line of text, and what paints it.
-function stageFor(svg, host) {
+// A canvas of the drawing's size with room for a line of text, and what paints both as they are now: {canvas, paint(text)}.
+function canvasFor(svg) {
+  const [width, height] = [svg.width, svg.height].map(({ baseVal }) => baseVal.value * RATIO);
   const even = (pixels) => 2 * Math.ceil(pixels / 2); // as encoders want it
   const canvas = document.createElement("canvas");
-  canvas.width = even(svg.width.baseVal.value * PIXELS);
-  canvas.height = even((svg.height.baseVal.value + 28) * PIXELS);
+  canvas.width = even(width);
+  canvas.height = even(height + 28 * RATIO);
   const context = canvas.getContext("2d", { alpha: false });
-  const probe = host.appendChild(document.createElement("span"));
-  probe.style.color = "var(--front)";
-  const back = colorOf(probe);
-  probe.style.color = "var(--text)";
-  const colors = { back, text: colorOf(probe) };
-  probe.remove();
-  return { canvas, paint: (text) => paint(context, svg, text, colors) };
-}
-
-// The frame as it is, as a PNG.
-async function framePng(svg, text) {
-  const { canvas, paint: draw } = stageFor(svg, svg.parentElement);
-  await draw(text);
-  return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
+  const [back, color] = ["var(--front)", "var(--text)"].map(themeColor);
+  return {
+    canvas,
+    async paint(text) {
+      const image = await imageOf(standaloneSvg(svg)); // before the canvas is emptied: it may be recorded
+      context.fillStyle = back;
+      context.fillRect(0, 0, canvas.width, canvas.height);
+      context.drawImage(image, 0, 0, width, height);
+      context.fillStyle = color;
+      context.font = `${13 * RATIO}px Inter, sans-serif`;
+      context.fillText(text, 8 * RATIO, canvas.height - 9 * RATIO);
+    },
+  };
 }
 
 // Records `seconds` of film: pose(second) puts the drawing there and returns the line of text, or null while it waits for
 // data. The film as a blob; null once the signal has ended it.
 async function record({ svg, seconds, pose, onProgress, signal }) {
-  const { canvas, paint: draw } = stageFor(svg(), svg().parentElement);
+  const { canvas, paint } = canvasFor(svg);
   const track = canvas.captureStream(RATE);
   const recorder = new MediaRecorder(track, { mimeType: typeHere(), videoBitsPerSecond: 6e6 });
   const chunks = [];
@@ -142,7 +115,7 @@ async function record({ svg, seconds, pose, onProgress, signal }) {
       waited += performance.now() - began;
     }
   };
-  await draw((await textAt(0)) ?? "");
+  await paint((await textAt(0)) ?? "");
   recorder.start(250);
   waited = 0;
   const began = performance.now();
@@ -150,7 +123,7 @@ async function record({ svg, seconds, pose, onProgress, signal }) {
     const text = await textAt(second);
     if (signal.aborted) break;
     if (recorder.state === "paused") recorder.resume();
-    await draw(text);
+    await paint(text);
     onProgress(second / seconds);
     const next = performance.now() - began - waited;
     await wait(Math.max(0, second * 1000 + 1000 / RATE - next));

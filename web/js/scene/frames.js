@@ -8,8 +8,7 @@ const MAX_PIECES = 8; // kept
 const PAUSE = 3000; // ms between two tries
 
 // `channels` are names; at(t) is null while the piece is on its way, then (name) -> value at t; `onPiece()` is called when one
-// has come, `onFailure(error)` when none does, `onPause()` when it is time to
-// ask again.
+// has come, `onFailure(error)` when none does, `onPause()` when it is time to ask again.
 export function makeFrames({ path, rate, channels, end, signal, onPiece, onFailure, onPause }) {
   const length = Math.max(1, Math.floor(PIECE / Math.max(1, channels.length))) / rate; // of a piece (s)
   const pieces = new Map(); // by number: null while on its way
@@ -62,9 +61,9 @@ export function makeFrames({ path, rate, channels, end, signal, onPiece, onFailu
 
 // What a drawing needs of a result: {channels, missing, stateOf(value)}, the state from the values of these channels.
 export function channelsOf(model, names) {
-  const displacement = (index) => names.ofStorey("displacement", index + 1);
-  const own = (index) => names.ofDamper("damper_displacement", index + 1);
-  const force = (index) => names.ofDamper("contact_force", index + 1);
+  const displacement = (index) => names.of("displacement", index + 1);
+  const own = (index) => names.of("damper_displacement", index + 1);
+  const force = (index) => names.of("contact_force", index + 1);
   const storeys = model.storeys.map(({ index }) => index);
   const drawn = model.dampers.map(({ index }) => index);
   const needed = [...storeys.map(displacement), ...drawn.map(own)];

@@ -5,7 +5,7 @@ import { Picture, endsOf } from "./drawing.js";
 import { MAX_DAMPERS, MAX_STOREYS, limit, modelOf } from "./model.js";
 import { px } from "./parts.js";
 import { useNews } from "../form/draft.js";
-import { useWidth } from "../ui/width.js";
+import { useWidth } from "../ui/hooks.js";
 import { layoutOf } from "./layout.js";
 
 const STEP = 1.05; // of an arrow key: a ratio

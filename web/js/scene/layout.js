@@ -38,7 +38,7 @@ const leastWidth = ({ label, radius, stops }, row) =>
     2 * radius + stops[0].thickness + stops[1].thickness + 36,
   );
 
-// {scale, width, height, slabs: [{storey, y, tall, foot, rows}], middle, wide, …}. `stroke` is the largest displacement that
+// {scale, width, height, slabs: [{storey, y, tall, foot, cavities}], middle, wide, …}. `stroke` is the largest displacement that
 // will be shown, without it the start's; `height` is what a frame should come to; `fixed` keeps a scale.
 export function layoutOf(model, { width, stroke, height, isCompact, trail = 0, fixed }) {
   const kind = isCompact ? "compact" : "full";

@@ -2,6 +2,8 @@
 import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { useNews } from "../form/draft.js";
+import { timesOf } from "../result/series.js";
+import { wallsOf } from "../chart/marks.js";
 import { number, quantity } from "../units.js";
 import { limit } from "./model.js";
 import { isObject } from "./inputs.js";
@@ -80,8 +82,7 @@ function relativeOf({ series, plan }, [carrier, own]) {
   if ((bucket / rate) * (plan.modes[0]?.frequency ?? 0) > MAX_BUCKET) return null;
   const middles = ({ values, min, max }) => values ?? min.map((low, at) => (low + max[at]) / 2);
   const [a, b] = [carrier, own].map((channel) => middles(series.channels[channel]));
-  const x = Float64Array.from(a, (_, k) => series.start + ((k + 0.5) * bucket - 0.5) / rate);
-  return { x, y: b.map((value, at) => value - a[at]) };
+  return { x: timesOf(series), y: b.map((value, at) => value - a[at]) };
 }
 
 function effectText({ summary }) {
@@ -168,13 +169,6 @@ export function Live({ draft, signal }) {
     <${LiveCharts} answer=${answer} bare=${bare} />
   </section>`;
 }
-
-const wallsOf = ({ offset = 0, clearance }) =>
-  [-1, 1].map((side) => ({
-    y: offset + (side * clearance) / 2,
-    label: side < 0 ? "left stop" : "right stop",
-    color: "wall",
-  }));
 
 function LiveCharts({ answer, bare }) {
   const [range, setRange] = useState(null);

@@ -1,10 +1,11 @@
 // A scene: described at the left, drawn and live at the right, run from here.
 import { schema as schemaNamed } from "../api.js";
+import { FaultList } from "../form/fault_list.js";
 import { focusField } from "../form/form.js";
-import { Failure, Figures, Help, IconButton, Loaded, Panel, faultText } from "../ui/controls.js";
+import { Failure, Figures, Help, IconButton, Loaded, Panel } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
-import { html, useEffect, useMemo, useReducer, useRef, useState } from "../ui/preact.js";
-import { useLoaded, useStore } from "../ui/store.js";
+import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
+import { useLoaded, useRedraw, useStore } from "../ui/hooks.js";
 import { Accuracy } from "./accuracy.js";
 import { Buffer } from "./buffer.js";
 import { SceneDrawing } from "./handles.js";
@@ -14,9 +15,8 @@ import { RecordField } from "./record_field.js";
 import { makeSession } from "./session.js";
 import { SceneForm } from "./steps.js";
 import { useNews } from "../form/draft.js";
-import { place } from "./inputs.js";
 import { link } from "../address.js";
-import { number, quantity, title, words } from "../units.js";
+import { number, quantity, words } from "../units.js";
 
 const WIDGETS = [
   [/^\/dampers.*buffer$/, Buffer],
@@ -83,7 +83,7 @@ function ScenePage({ address, signal }) {
 }
 
 function Steps({ past }) {
-  const [, redraw] = useReducer((count) => count + 1, 0);
+  const redraw = useRedraw();
   useEffect(() => past.onChange(redraw), [past]);
   return html`<${IconButton} label="Undo (Ctrl+Z)" disabled=${!past.canUndo} onClick=${past.undo}
       >Undo<//
@@ -164,22 +164,6 @@ function JsonText({ draft }) {
     ></textarea>`;
 }
 
-// Faults or warnings, each leading to its place by onGo(pointer); the box can take the focus.
-const Places = ({ kind, heading, list, onGo }) =>
-  html`<div class=${`notice ${kind}`} tabindex="-1">
-    <strong>${heading}</strong>
-    <ul>
-      ${list.map(
-        ({ pointer = "", ...fault }) =>
-          html`<li>
-            <button type="button" class="quiet" onClick=${() => onGo(pointer)}>
-              ${title(place(pointer || "/scene"))}</button
-            >${` ${faultText(fault)}`}
-          </li>`,
-      )}
-    </ul>
-  </div>`;
-
 function Answer({ answer, onGo }) {
   const { plan, cost, warnings, cached, result } = answer;
   const { modes, contact_model: model, solver } = plan;
@@ -194,7 +178,7 @@ function Answer({ answer, onGo }) {
       ]}
     />
     ${cached && html`<p>Run before: <a href=${link(`results/${result}`)}>its result</a>.</p>`}
-    ${warnings.length > 0 && html`<${Places} kind="warn" heading="Before you rely on it" list=${warnings} onGo=${onGo} />`}`;
+    ${warnings.length > 0 && html`<${FaultList} kind="warn" heading="Before you rely on it" faults=${warnings} whole="scene" onGo=${onGo} />`}`;
 }
 
 // `outcome` is {answer}, {faults} or {error}, or null.
@@ -202,11 +186,12 @@ function Estimate({ outcome, onGo }) {
   if (outcome === null) return null;
   const { answer, faults, error } = outcome;
   if (faults)
-    return html`<${Places}
-      kind="bad"
+    return html`<${FaultList}
       heading="To be mended before it runs"
-      list=${faults}
+      faults=${faults}
+      whole="scene"
       onGo=${onGo}
+      tabindex="-1"
     />`;
   return error
     ? html`<${Failure} error=${error} />`

@@ -1,6 +1,7 @@
 // What a scene does while it is edited: runs that the service keeps nothing of, one at a time, always the newest scene.
 import { check, post } from "../api.js";
-import { storeyCount } from "./url.js";
+import { timesOf } from "../result/series.js";
+import { channelNamer, storeyCount } from "./channels.js";
 
 const MAX_COST = 0.05; // s of processor time that a preview may take
 const LARGE = 20; // storeys: such scenes are asked what they cost before they are run
@@ -14,8 +15,8 @@ export async function preview({ scene, points }, signal) {
   return post(`v1/preview?points=${points}`, scene, { signal });
 }
 
-// Keeps asking while scenes come: preview.ask({scene, points, …}); `show({asked, data, error})` after each answer, `asked` being what was
-// asked. Stops with the signal.
+// Keeps asking while scenes come by preview.ask(asked), an object {scene, points, …}; `show({asked, data, error})` is called after
+// each answer. Stops with the signal.
 export function makePreview(show, signal) {
   let wanted = null;
   let isBusy = false;
@@ -41,37 +42,26 @@ export function makePreview(show, signal) {
 }
 
 // The scene as it is previewed: without a study, with the channels that are drawn.
-export function previewScene(scene) {
-  const { study, title, labels, output, ...rest } = scene;
-  const { structure = {}, dampers = [] } = rest;
-  const storeys = [structure.masses ?? structure.mass].flat().length;
-  const isNumbered = storeys > 1 || dampers.length > 1;
+export function previewScene({ study, title, labels, ...scene }) {
+  const { dampers = [] } = scene;
   const damper = dampers[0];
-  const storey = damper?.storey ?? storeys;
-  const name = (word, number) => (isNumbered ? `${word}_${number}` : word);
-  const channels = [
-    name("displacement", storey),
-    ...(damper ? [name("damper_displacement", 1)] : []),
-  ];
+  const nameOf = channelNamer(scene);
+  const channels = [nameOf("displacement", damper?.storey ?? storeyCount(scene))];
+  if (damper) channels.push(nameOf("damper_displacement", 1));
   return {
-    scene: { ...rest, output: { channels, impacts: false } },
+    scene: { ...scene, output: { channels, impacts: false } },
     channels,
     damper,
     name: dampers.length > 1 ? "Free mass 1" : "Free mass",
   };
 }
 
-// The same without dampers: the exact solver does, whatever the scene asks for.
-export function bareScene(scene) {
-  const { study, title, labels, contact, accuracy, ...rest } = scene;
-  const { structure = {} } = rest;
-  const storeys = [structure.masses ?? structure.mass].flat().length;
-  const channel =
-    storeys > 1 ? `displacement_${rest.dampers?.[0]?.storey ?? storeys}` : "displacement";
-  return {
-    scene: { ...rest, dampers: [], output: { channels: [channel], impacts: false } },
-    channel,
-  };
+// The same without dampers, with the motion of a storey: the exact solver does, whatever the scene asks for.
+export function bareScene({ study, title, labels, contact, accuracy, ...rest }, storey) {
+  const scene = { ...rest, dampers: [] };
+  const usual = rest.dampers?.[0]?.storey ?? storeyCount(rest);
+  const channel = channelNamer(scene)("displacement", storey ?? usual);
+  return { scene: { ...scene, output: { channels: [channel], impacts: false } }, channel };
 }
 
 // The samples of a channel as a chart takes them; of buckets the two ends, one after the other, so that no peak is lost.
@@ -79,11 +69,7 @@ export function samplesOf({ series }, channel) {
   const { start, count, bucket = 1, sample_rate: rate } = series;
   const { values, min, max } = series.channels[channel];
   const width = bucket / rate;
-  if (values || bucket === 1)
-    return {
-      x: Float64Array.from({ length: count }, (_, k) => start + k / rate),
-      y: values ?? min,
-    };
+  if (values || bucket === 1) return { x: timesOf(series), y: values ?? min };
   const x = new Float64Array(2 * count);
   const y = new Float64Array(2 * count);
   for (let k = 0; k < count; k++) {

@@ -4,7 +4,7 @@ import { get } from "../api.js";
 import { ChoiceField } from "../form/fields.js";
 import { Failure } from "../ui/controls.js";
 import { html } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { quantity } from "../units.js";
 
 export function RecordField(context) {

@@ -1,15 +1,15 @@
 // A scene while it is edited: kept in the address, checked by the service a moment after each change, run from here.
-import { go } from "../address.js";
+import { go, jobPath } from "../address.js";
 import { check, submit } from "../api.js";
 import { makeDraft } from "../form/draft.js";
-import { createStore } from "../ui/store.js";
+import { createStore } from "../store.js";
 import { keep, open, sponge } from "./url.js";
 
 const PAUSE = 250; // ms without a change
 
 // `status` is a store of {text, outcome: {answer}, {faults} or {error}, loadError, isRunning}.
 export function makeSession(signal) {
-  const draft = makeDraft(sponge(), signal);
+  const draft = makeDraft(sponge());
   const past = makeHistory(draft);
   const status = createStore({ text: "", outcome: null, loadError: null, isRunning: false });
   let timer = null;
@@ -61,9 +61,7 @@ export function makeSession(signal) {
   async function start() {
     status.patch({ isRunning: true, text: "Running …" });
     await loading;
-    await ask(submit, ({ id, status: state, result }) =>
-      go(state === "successful" ? `results/${result}` : `jobs/${id}`),
-    );
+    await ask(submit, (job) => go(jobPath(job)));
     status.patch({ isRunning: false });
   }
   return {

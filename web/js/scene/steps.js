@@ -6,7 +6,8 @@ import { place, unitAt } from "./inputs.js";
 import { Help } from "../ui/controls.js";
 import { html, useEffect, useMemo } from "../ui/preact.js";
 import { title } from "../units.js";
-import { sponge, storeyCount } from "./url.js";
+import { sponge } from "./url.js";
+import { storeyCount } from "./channels.js";
 
 const STEPS = [
   ["structure"],

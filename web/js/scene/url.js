@@ -1,6 +1,9 @@
 // Which scene the page begins with, and where it is kept: in the URL.
 import { link, pack, read, unpack } from "../address.js";
 import { get } from "../api.js";
+import { storeyCount } from "./channels.js";
+
+const MAX_LENGTH = 100000; // characters of a link
 
 // There before anything is fetched.
 export const sponge = () => ({
@@ -34,13 +37,10 @@ export async function open({ s, example, result, job, buffer, record }, left) {
   return sponge();
 }
 
-export const storeyCount = ({ structure } = {}) =>
-  [structure?.masses ?? structure?.mass].flat().length;
-
 // The same scene as one would type it: materials by name, the usual channels unsaid.
 function typical(scene) {
-  const { dampers = [], output, study = {} } = scene,
-    { channels } = output;
+  const { dampers = [], output, study = {} } = scene;
+  const { channels } = output;
   for (const damper of dampers)
     for (const name in damper) damper[name] = damper[name].material ?? damper[name];
   if (
@@ -57,8 +57,8 @@ function typical(scene) {
 
 // Keeps a scene in the URL while it is the last one; false where it is too long.
 export async function keep(scene, isLast) {
-  const s = await pack(scene),
-    fits = s.length <= 100000;
+  const s = await pack(scene);
+  const fits = s.length <= MAX_LENGTH;
   if (isLast() && /^(scene)?$/.test(read().path.join()))
     history.replaceState(fits ? null : scene, "", link("scene", fits ? { s } : {}));
   return fits;

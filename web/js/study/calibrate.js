@@ -6,14 +6,18 @@ import { link } from "../address.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
-import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
-import { number, quantity, title, words } from "../units.js";
-import { Bars, Decision, SceneLink, between, quantities, remarksOf, sentence } from "./parts.js";
-
-const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
-const unitOf = ({ unit }) => unit;
-const isKnown = { true: "yes", false: "no" };
+import { number, quantity, share, title, words, yesNo } from "../units.js";
+import {
+  Bars,
+  Decision,
+  SceneLink,
+  between,
+  pointerOf,
+  quantities,
+  remarksOf,
+  remarkText,
+} from "./parts.js";
 
 // "25 ± 0.03 ms"
 function parameterText({ value, standard_error: error, unit }) {
@@ -29,7 +33,7 @@ export function CalibrateStudy() {
     .map((one) => `${labelOf(pointerOf(one))} ${parameterText(one)}`)
     .join(", ");
   const remarks = [
-    sentence(detail),
+    remarkText(detail),
     shift !== 0 &&
       shift !== null &&
       `The measurement begins ${quantity(shift, "s")} later than the scene.`,
@@ -110,13 +114,13 @@ function Intervals({ parameters }) {
 function Parameters({ parameters }) {
   const columns = [
     { label: "Parameter", value: (one) => title(labelOf(pointerOf(one))) },
-    quantities("Value", ({ value }) => value, unitOf),
-    quantities("Standard error", (one) => one.standard_error, unitOf, 3),
+    quantities("Value", ({ value }) => value),
+    quantities("Standard error", (one) => one.standard_error, 3),
     {
       label: "95 %",
       value: ({ interval_95: interval, unit }) => (interval ? between(...interval, unit) : null),
     },
-    { label: "Identifiable", value: ({ identifiable }) => isKnown[identifiable] ?? null },
+    { label: "Identifiable", value: ({ identifiable }) => yesNo[identifiable] ?? null },
   ];
   return html`<${Table} caption="Parameters" columns=${columns} rows=${parameters} />`;
 }
@@ -124,15 +128,15 @@ function Parameters({ parameters }) {
 function Residuals({ residuals }) {
   const columns = [
     { label: "Channel", value: ({ channel }) => title(channel) },
-    quantities("RMS of what is left", ({ value }) => value, unitOf, 3),
-    quantities("Measured RMS", (one) => one.measured_rms, unitOf, 3),
+    quantities("RMS of what is left", ({ value }) => value, 3),
+    quantities("Measured RMS", (one) => one.measured_rms, 3),
     {
       label: "Part",
       isNumeric: true,
       value: (one) => one.value / one.measured_rms,
       cell: (one) => share(one.value / one.measured_rms, 3),
     },
-    quantities("Stated noise", ({ deviation }) => deviation, unitOf, 3),
+    quantities("Stated noise", ({ deviation }) => deviation, 3),
     { label: "Samples", isNumeric: true, value: ({ samples }) => number(samples, 9) },
   ];
   return html`<${Table} caption="Residuals" columns=${columns} rows=${residuals} />`;

@@ -3,12 +3,11 @@
 import { html, useMemo } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
-import { share } from "../result/headlines.js";
 import { bandLine } from "../runs/bands.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
-import { capital, metricOf, number, quantity, title, words } from "../units.js";
-import { Bars, Decision, sentence } from "./parts.js";
+import { capital, metricOf, number, quantity, share, title, words } from "../units.js";
+import { Bars, Decision, remarkText } from "./parts.js";
 
 const MAX_NAMED = 3; // in a sentence
 const PROPER = /^(hertz|hunt crossley|lankarani nikravesh|flores|jankowski)/;
@@ -90,7 +89,7 @@ export function CompareStudy() {
     <${Spectra} entries=${entries} study=${study} />
     <${Motions} entries=${entries} study=${study} />
     <${Numbers} entries=${entries} units=${units} />
-    ${refused.map(({ name, why }) => html`<p class="hint">${`Not run: ${modelName(name)}. ${sentence(why).replace(", is ", "; it is ")}`}</p>`)}`;
+    ${refused.map(({ name, why }) => html`<p class="hint">${`Not run: ${modelName(name)}. ${remarkText(why).replace(", is ", "; it is ")}`}</p>`)}`;
 }
 
 function Differences({ entries, measure }) {

@@ -1,13 +1,12 @@
 // A metric over two axes of numbers: filled contours with a scale of colours, the best point, the chosen one, a cursor that
-// arrow keys move. Each
-// level's area is where the values are at least so large; where a corner is not known there is a gap.
+// arrow keys move. Each level's area is where the values are at least so large; where a corner is not known there is a gap.
 import { announce } from "../ui/announce.js";
 import { html, useMemo, useState } from "../ui/preact.js";
 import { axisUnit } from "../chart/axis.js";
 import { Chart } from "../chart/chart.js";
 import { number, quantity } from "../units.js";
-import { extentOfValues } from "./parts.js";
 import { placeText, rowAt } from "./sweep_model.js";
+import { extentOf, roundStep } from "../chart/scale.js";
 
 // From dark to light in even steps of lightness, for any sight.
 const STOPS = [
@@ -78,9 +77,7 @@ export function levelsOf(low, high, count = 9, isLog = false) {
     const ratio = (high / low) ** (1 / count);
     return Array.from({ length: count }, (_, at) => low * ratio ** at);
   }
-  const raw = (high - low) / count;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 2.5, 5, 10].find((one) => one * power >= raw) * power;
+  const step = roundStep((high - low) / count);
   const first = Math.ceil(low / step) * step;
   const levels = [low];
   for (let level = first; level < high; level += step) if (level > low) levels.push(level);
@@ -133,11 +130,8 @@ export function Contours({ model, picture, metric, best, chosen, pick, height, i
   const { x, over } = picture;
   const key = picture.fixed.map(({ index }) => fixedAt?.[index]).join();
   const rows = useMemo(() => gridOf(model, picture, fixedAt), [model, key]);
-  const valueAt = (i, j) => {
-    const value = metric.values[rows[j][i]];
-    return Number.isFinite(value) ? value : NaN;
-  };
-  const [low, high] = extentOfValues(rows.flat().map((row) => metric.values[row])) ?? [0, 0];
+  const valueAt = (i, j) => metric.values[rows[j][i]];
+  const [low, high] = extentOf([rows.flat().map((row) => metric.values[row])]) ?? [0, 0];
   const isLog = low > 0 && high > 50 * low;
   const levels = useMemo(() => levelsOf(low, high, 9, isLog), [low, high]);
   const [hovered, setHovered] = useState(null); // a row

@@ -7,7 +7,15 @@ import { useResult } from "../result/context.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Bars, Decision, SceneLink, between, plainScene, quantities } from "./parts.js";
+import {
+  Bars,
+  Decision,
+  MetricChoice,
+  SceneLink,
+  between,
+  plainScene,
+  quantities,
+} from "./parts.js";
 
 // Bins by the rule of Freedman and Diaconis, at least as many as that of Sturges.
 function histogram(values) {
@@ -47,12 +55,7 @@ export function EnsembleStudy() {
   return html`${metric && html`<${Lead} one=${statistics[metric]} metric=${metric} study=${study} more=${[kept, all]} />`}
     ${failed > 0 && html`<p class="fault">${`${failed} runs failed and count in nothing: ${failures[0].detail}`}</p>`}
     <div class="row">
-      <${Choice}
-        label="Metric"
-        options=${varying.map((key) => ({ value: key, label: title(key) }))}
-        value=${metric}
-        onChange=${(key) => change({ metric: key })}
-      />
+      <${MetricChoice} metrics=${varying} metric=${metric} change=${change} />
       <${Choice}
         label="Shape"
         options=${SHAPES}
@@ -196,12 +199,7 @@ function Numbers({ statistics, known, scene, inputs, runs }) {
     ...plainScene(scene),
     excitation: { ...scene.excitation, seed },
   });
-  const of = (key) =>
-    quantities(
-      title(key),
-      (row) => row[key],
-      ({ unit }) => unit,
-    );
+  const of = (key) => quantities(title(key), (row) => row[key]);
   const columns = [
     { label: "Metric", value: ({ metric }) => title(metric) },
     of("mean"),

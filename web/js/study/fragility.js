@@ -163,7 +163,7 @@ function Records({ curves, fractiles, limit, unit, measure }) {
 function Limits({ limits, unitOf }) {
   const columns = [
     { label: "Metric", value: ({ metric }) => title(metric) },
-    quantities("Limit", ({ value }) => value, unitOf),
+    quantities("Limit", ({ value }) => value, 4, unitOf),
     { label: "Median", unit: "m/s^2", value: ({ median }) => median },
     {
       label: "95 % of the median",

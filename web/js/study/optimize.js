@@ -6,23 +6,13 @@ import { html, useMemo } from "../ui/preact.js";
 import { get, schema as schemaNamed } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
-import { share } from "../result/headlines.js";
 import { unitAt } from "../scene/inputs.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
-import { quantity, title, words } from "../units.js";
+import { quantity, share, title, words } from "../units.js";
 import { UpwardTitle, levelsOf, shade } from "./contours.js";
-import {
-  Bars,
-  Decision,
-  SceneLink,
-  between,
-  extentOfValues,
-  quantities,
-  remarksOf,
-} from "./parts.js";
-
-const pointerOf = ({ pointer, pointers }) => pointer ?? pointers[0];
+import { Bars, Decision, SceneLink, between, pointerOf, quantities, remarksOf } from "./parts.js";
+import { extentOf } from "../chart/scale.js";
 
 export function OptimizeStudy() {
   const { result, path } = useResult();
@@ -96,6 +86,7 @@ function Gain({ study: { best, given, undamped }, units }) {
     quantities(
       label,
       (metric) => source?.metrics[metric],
+      4,
       (metric) => units[metric],
     );
   const columns = [
@@ -121,7 +112,7 @@ function Search({ study: { history, best, objectives }, unit, unitOf }) {
   const isMap = numbers.length === 2 && variables.length === 2;
   const [across, up] = numbers;
   const known = history.filter(({ objectives: [value] }) => Number.isFinite(value));
-  const levels = levelsOf(...(extentOfValues(known.map((one) => one.objectives[0])) ?? [0, 0]), 7);
+  const levels = levelsOf(...(extentOf([known.map((one) => one.objectives[0])]) ?? [0, 0]), 7);
   const groups = useMemo(() => {
     const named = ({ values, objectives: [value] }) =>
       isMap
@@ -173,21 +164,10 @@ function Search({ study: { history, best, objectives }, unit, unitOf }) {
 function Front({ study: { front, objectives, best }, units, values }) {
   const [first, second] = objectives;
   const sorted = front.toSorted((a, b) => a.objectives[0] - b.objectives[0]);
+  const [x, y] = [0, 1].map((at) => sorted.map((one) => one.objectives[at]));
   const series = [
-    {
-      label: "best compromises",
-      color: "ok",
-      x: sorted.map((one) => one.objectives[0]),
-      y: sorted.map((one) => one.objectives[1]),
-    },
-    {
-      kind: "points",
-      size: 8,
-      label: "candidates on the front",
-      color: "ok",
-      x: sorted.map((one) => one.objectives[0]),
-      y: sorted.map((one) => one.objectives[1]),
-    },
+    { label: "best compromises", color: "ok", x, y },
+    { kind: "points", size: 8, label: "candidates on the front", color: "ok", x, y },
   ];
   const rules = best
     ? [{ x: best.objectives[0].value, label: "recommended", color: "accent" }]
@@ -200,29 +180,25 @@ function Front({ study: { front, objectives, best }, units, values }) {
       value: (one) => one.objectives[at],
     })),
   ];
-  const hint = second
-    ? `No candidate has both less ${words(first.metric)} and less ${words(second.metric)} than one of these.`
-    : "";
-  return html`${
-      second &&
-      html`<${Chart}
-        title="Best compromises"
-        height=${280}
-        x=${{ label: title(first.metric), unit: units[first.metric] }}
-        y=${{ label: title(second.metric), unit: units[second.metric] }}
-        series=${series}
-        rules=${rules}
-      />`
-    }
-    <p class="hint">${hint}</p>
+  return html`<${Chart}
+      title="Best compromises"
+      height=${280}
+      x=${{ label: title(first.metric), unit: units[first.metric] }}
+      y=${{ label: title(second.metric), unit: units[second.metric] }}
+      series=${series}
+      rules=${rules}
+    />
+    <p class="hint">
+      ${`No candidate has both less ${words(first.metric)} and less ${words(second.metric)} than one of these.`}
+    </p>
     <${Table} caption="Best compromises" columns=${columns} rows=${sorted} />`;
 }
 
 function Region({ region, unitOf }) {
   const columns = [
     { label: "Member", value: (one) => title(labelOf(pointerOf(one))) },
-    quantities("From", ({ low }) => low, unitOf),
-    quantities("To", ({ high }) => high, unitOf),
+    quantities("From", ({ low }) => low, 4, unitOf),
+    quantities("To", ({ high }) => high, 4, unitOf),
   ];
   const rows = region.filter(({ low }) => low !== null);
   return html`<h3>Within 2 % of the best</h3>

@@ -1,17 +1,18 @@
 // What the pages of studies share: the sentence that a study leads to, ways to scenes and runs, bars.
 import { html } from "../ui/preact.js";
-import { go, link, pack } from "../address.js";
+import { go, jobPath, link, pack } from "../address.js";
 import { Chart } from "../chart/chart.js";
-import { Button, Failure, withSubscripts } from "../ui/controls.js";
+import { extentOf } from "../chart/scale.js";
+import { Button, Choice, Failure, optionsOf, withSubscripts } from "../ui/controls.js";
 import { labelOf } from "../runs/names.js";
-import { useLoaded } from "../ui/store.js";
-import { quantity, readable } from "../units.js";
+import { useLoaded } from "../ui/hooks.js";
+import { quantity, readable, title } from "../units.js";
 
 // The scene alone, without its study.
 export const plainScene = ({ study, ...scene }) => scene;
 
 // A clause of the service as a sentence; a member is named by its words.
-export const sentence = (clause) =>
+export const remarkText = (clause) =>
   `${readable(clause)
     .replace(/^(\/\S+):/, (_, pointer) => labelOf(pointer))
     .replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase())}.`;
@@ -19,13 +20,13 @@ export const sentence = (clause) =>
 // What the service remarks on a study, a sentence each; one without a subject is about the member that it points at.
 export const remarksOf = ({ warnings }) =>
   warnings.map(({ pointer, detail }) =>
-    sentence(/^(may|is|has) /.test(detail) ? `${labelOf(pointer)} ${detail}` : detail),
+    remarkText(/^(may|is|has) /.test(detail) ? `${labelOf(pointer)} ${detail}` : detail),
   );
 
 export const between = (low, high, unit) =>
   `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
 
-// What a study leads to: one sentence, with what follows from it.
+// What a study leads to: one remarkText, with what follows from it.
 export const Decision = ({ children, more = [], actions }) =>
   html`<div class="decision">
     <p class="answer">${typeof children === "string" ? withSubscripts(children) : children}</p>
@@ -34,7 +35,7 @@ export const Decision = ({ children, more = [], actions }) =>
   </div>`;
 
 // A column of quantities that have a unit each.
-export const quantities = (label, value, unitOf, digits) => ({
+export const quantities = (label, value, digits, unitOf = ({ unit }) => unit) => ({
   label,
   isNumeric: true,
   value,
@@ -53,28 +54,29 @@ export function SceneLink({ label, load, keys = [], className }) {
 
 // A button that makes a job and goes to its result, or to the job while it runs.
 export function JobButton({ label, make, isPrimary }) {
-  const run = async () => {
-    const job = await make();
-    go(job.status === "successful" ? `results/${job.result}` : `jobs/${job.id}`);
-  };
+  const run = async () => go(jobPath(await make()));
   return html`<${Button} isPrimary=${isPrimary} onClick=${run}>${label}<//>`;
 }
 
-// [smallest, largest] of the numbers among values; null where there is none.
-export function extentOfValues(values) {
-  const numbers = values.filter((value) => Number.isFinite(value));
-  if (numbers.length === 0) return null;
-  return [Math.min(...numbers), Math.max(...numbers)];
-}
+// The place of the scene that something varies, of several the first.
+export const pointerOf = ({ pointer, pointers }) => pointer ?? pointers?.[0] ?? "";
+
+export const MetricChoice = ({ metrics, metric, change }) =>
+  html`<${Choice}
+    label="Metric"
+    options=${optionsOf(metrics, title)}
+    value=${metric}
+    onChange=${(key) => change({ metric: key })}
+  />`;
 
 // Horizontal bars with their names at the left and their numbers at the right: tornado charts, shares, gains.
 const ROW = 26; // px
 
 // `rows`: {label, from, to, text, color, interval: [low, high]}; bars go from `from` (0 where absent) to `to`. `origin` is a
 // place with an upright line.
-export function Bars({ title, description, x, rows, origin = 0 }) {
+export function Bars({ title: name, description, x, rows, origin = 0 }) {
   const ends = rows.flatMap(({ from, to, interval }) => [from ?? origin, to, ...(interval ?? [])]);
-  const [low, high] = extentOfValues([...ends, origin]) ?? [0, 1];
+  const [low, high] = extentOf([[...ends, origin]]) ?? [0, 1];
   const margin = 0.03 * (high - low || 1);
   const least = low === 0 ? 0 : low - margin;
   const domain = [least, high === 0 ? 0 : high + margin];
@@ -100,7 +102,7 @@ export function Bars({ title, description, x, rows, origin = 0 }) {
       </g>`;
     });
   return html`<${Chart}
-    title=${title}
+    title=${name}
     description=${description ?? rows.map(({ label, text }) => `${label}: ${text}`).join("; ")}
     height=${rows.length * ROW}
     isFixed

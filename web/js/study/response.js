@@ -3,14 +3,11 @@
 import { html, useMemo } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
-import { share } from "../result/headlines.js";
-import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
-import { quantity, title } from "../units.js";
-import { Decision, remarksOf } from "./parts.js";
+import { quantity, share, title, yesNo } from "../units.js";
+import { Decision, MetricChoice, pointerOf, remarksOf } from "./parts.js";
 import { labelOf } from "../runs/names.js";
 
-const STABLE = { true: "yes", false: "no" };
 const METRICS = ["peak_displacement", "rms_displacement"];
 
 const counted = (count, name) => `${count} ${name}${count === 1 ? "" : "s"}`;
@@ -85,8 +82,8 @@ function decisionOf(points, name, unit) {
 export function ResponseStudy() {
   const { result, query, change } = useResult();
   const { study } = result;
-  const { points, unit, pointer, pointers } = study;
-  const name = labelOf(pointer ?? pointers[0]);
+  const { points, unit } = study;
+  const name = labelOf(pointerOf(study));
   const metric = METRICS.includes(query.metric) ? query.metric : METRICS[0];
   const series = useMemo(() => {
     const irregular = points.filter(({ period }) => !period);
@@ -127,12 +124,7 @@ export function ResponseStudy() {
   const facts = [counts.filter(Boolean).join(" "), ...remarksOf(study)];
   return html`<${Decision} more=${facts}>${decisionOf(points, name, unit)}<//>
     <div class="row">
-      <${Choice}
-        label="Metric"
-        options=${METRICS.map((value) => ({ value, label: title(value) }))}
-        value=${metric}
-        onChange=${(value) => change({ metric: value })}
-      />
+      <${MetricChoice} metrics=${METRICS} metric=${metric} change=${change} />
     </div>
     <${Chart}
       title="Response curve"
@@ -152,7 +144,7 @@ function Points({ points, unit, name }) {
     { label: "Impacts a period", isNumeric: true, value: (one) => one.impacts_per_period },
     {
       label: "Stable",
-      value: ({ period, stable }) => (period ? STABLE[stable] : null),
+      value: ({ period, stable }) => (period ? yesNo[stable] : null),
     },
     { label: "Peak displacement", unit: "m", value: (one) => one.peak_displacement },
     { label: "Without dampers", unit: "m", value: (one) => one.undamped_peak_displacement },

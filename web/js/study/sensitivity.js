@@ -3,13 +3,10 @@
 import { html } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
-import { share } from "../result/headlines.js";
-import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
-import { number, quantity, title, words } from "../units.js";
-import { Bars, Decision, between, quantities } from "./parts.js";
+import { number, quantity, share, title, words } from "../units.js";
+import { Bars, Decision, MetricChoice, between, quantities } from "./parts.js";
 
-const unitOf = ({ unit }) => unit;
 const NAMES = { restitution: "restitution e", contact_time: "contact time", mass: "free mass" };
 const nameOf = (parameter) => NAMES[parameter] ?? words(parameter);
 
@@ -54,12 +51,7 @@ export function SensitivityStudy() {
   ];
   return html`<${Decision} more=${remarks}>${decisionOf(study, errors, metric)}<//>
     <div class="row">
-      <${Choice}
-        label="Metric"
-        options=${metrics.map((value) => ({ value, label: title(value) }))}
-        value=${metric}
-        onChange=${(value) => change({ metric: value })}
-      />
+      <${MetricChoice} metrics=${metrics} metric=${metric} change=${change} />
     </div>
     <${Tornado} response=${response} metric=${metric} />
     ${study.made > 0 && html`<${Spread} statistics=${statistics} made=${study.made} errors=${errors} />`}
@@ -89,8 +81,8 @@ function Tornado({ response, metric }) {
 function Spread({ statistics, made, errors }) {
   const columns = [
     { label: "Metric", value: (row) => title(row.metric) },
-    quantities("As stated", ({ value }) => value, unitOf),
-    quantities("Median", ({ median }) => median, unitOf),
+    quantities("As stated", ({ value }) => value),
+    quantities("Median", ({ median }) => median),
     { label: "5 to 95 %", value: (row) => between(row.q05, row.q95, row.unit) },
     {
       label: "Width",

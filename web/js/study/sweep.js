@@ -4,9 +4,8 @@ import { html, useMemo } from "../ui/preact.js";
 import { get, post, submit } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Loaded, Notice } from "../ui/controls.js";
-import { useLoaded } from "../ui/store.js";
-import { number, quantity } from "../units.js";
-import { share } from "../result/headlines.js";
+import { useLoaded } from "../ui/hooks.js";
+import { number, quantity, share } from "../units.js";
 import { useResult } from "../result/context.js";
 import { Contours } from "./contours.js";
 import { Decision, JobButton, SceneLink } from "./parts.js";
@@ -213,7 +212,6 @@ function Failures({ answer, jobId }) {
 
 // The series of a metric over the axis across: one, or one for each value of the other axis.
 function seriesOf(model, { kind, x, over, fixed }, metric, chosen) {
-  const isIn = (value) => (Number.isFinite(value) ? value : NaN);
   if (kind === "list") {
     const rows = [...model.indices.keys()].sort(
       (a, b) => model.columns[x.pointer].values[a] - model.columns[x.pointer].values[b],
@@ -224,7 +222,7 @@ function seriesOf(model, { kind, x, over, fixed }, metric, chosen) {
         color: "accent",
         rows,
         x: rows.map((row) => model.columns[x.pointer].values[row]),
-        y: rows.map((row) => isIn(metric.values[row])),
+        y: rows.map((row) => metric.values[row]),
       },
     ];
   }
@@ -243,7 +241,7 @@ function seriesOf(model, { kind, x, over, fixed }, metric, chosen) {
       color: over ? `c${line + 1}` : "accent",
       rows,
       x: x.isNumeric ? x.values : x.values.map((_value, at) => at),
-      y: rows.map((row) => isIn(metric.values[row])),
+      y: rows.map((row) => metric.values[row]),
     };
   });
 }

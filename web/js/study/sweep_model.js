@@ -2,15 +2,16 @@
 // point.
 import { valueText } from "../runs/scene_name.js";
 import { title } from "../units.js";
-import { extentOfValues } from "./parts.js";
+import { pointerOf } from "./parts.js";
 import { labelOf } from "../runs/names.js";
+import { extentOf } from "../chart/scale.js";
 
 // Metrics of the structure's response, of which less is better, the first question of a sweep.
 const RESPONSES = /^(rms|peak)_(displacement|acceleration|storey_drift|base_shear)$/;
 const isSmallerBetter = (key) => RESPONSES.test(key) || key === "peak_contact_force";
 
-function axisOf({ pointer, pointers, unit, values }, index, all) {
-  const place = pointer ?? pointers?.[0] ?? "";
+function axisOf({ unit, values, ...varied }, index, all) {
+  const place = pointerOf(varied);
   return {
     index,
     pointer: place,
@@ -23,8 +24,8 @@ function axisOf({ pointer, pointers, unit, values }, index, all) {
   };
 }
 
-function metricOf(key, { unit, values }) {
-  const [low, high] = extentOfValues(values) ?? [null, null];
+function metricColumn(key, { unit, values }) {
+  const [low, high] = extentOf([values]) ?? [null, null];
   const largest = Math.max(Math.abs(low), Math.abs(high));
   return {
     key,
@@ -38,13 +39,13 @@ function metricOf(key, { unit, values }) {
   };
 }
 
-// {axes, varying, metrics, rows: the row of a point by its index, points: indices by row}
+// {isGrid, axes, varying, metrics, columns, status, indices: of points by row, rows: Map of the index of a point to its row}
 export function sweepModel(answer) {
   const { columns } = answer;
   const axes = answer.axes.map(axisOf);
   const metrics = Object.keys(columns)
     .filter((key) => !/^(index|status|\/.*)$/.test(key))
-    .map((key) => metricOf(key, columns[key]));
+    .map((key) => metricColumn(key, columns[key]));
   const indices = columns.index.values;
   return {
     isGrid: answer.mode === "grid",

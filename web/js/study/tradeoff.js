@@ -1,11 +1,9 @@
 // Error against CPU time of every way to run a scene, and which to take. In the address: way (a name).
 import { html, useMemo } from "../ui/preact.js";
-import { go, pack } from "../address.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
-import { share } from "../result/headlines.js";
 import { Table } from "../ui/table.js";
-import { capital, number, quantity, readable, words } from "../units.js";
+import { capital, number, quantity, readable, share, words } from "../units.js";
 import { Decision, SceneLink, plainScene } from "./parts.js";
 
 // The scene run this way.
@@ -84,7 +82,6 @@ export function TradeoffStudy() {
       })),
     ];
   }, [measured]);
-  const open = async (way) => go("scene", { s: await pack(applied(scene, way)) });
   const marked = [taken, chosen].filter((point) => measured.includes(point));
   const marker = (plot) => [...new Set(marked)].map((point) => markerOf(point, plot));
   const markerOf = (point, plot) => {
@@ -138,7 +135,12 @@ export function TradeoffStudy() {
       chosen
         ? html`<p role="status">
             ${`${readable(chosen.name)}: error ${number(error(chosen), 3)}, ${quantity(chosen.cpu_minimum, "s", 3)}. `}
-            <button type="button" onClick=${() => open(chosen)}>Use this way in the scene</button>
+            <${SceneLink}
+              className="button"
+              label="Use this way in the scene"
+              load=${() => applied(scene, chosen)}
+              keys=${[chosen]}
+            />
           </p>`
         : html`<p class="hint">Down and to the left is better. A click on a point names it.</p>`
     }

@@ -4,7 +4,7 @@ import { ResultContext, useResultContext } from "../result/context.js";
 import { ResultView } from "../result/view.js";
 import { Loaded, Panel } from "../ui/controls.js";
 import { html, useState } from "../ui/preact.js";
-import { useLoaded } from "../ui/store.js";
+import { useLoaded } from "../ui/hooks.js";
 import { KINDS } from "./kinds.js";
 
 export function StudyView({ result, signal, jobs, rest }) {

@@ -4,8 +4,8 @@ import { html, useLayoutEffect, useRef, useState } from "./preact.js";
 import { link, read } from "../address.js";
 import { reason } from "../api.js";
 import { announce } from "./announce.js";
-import { freshId } from "./ids.js";
-import { capital, pretty } from "../units.js";
+import { useId } from "./hooks.js";
+import { capital, pretty, words } from "../units.js";
 
 // A button that is not pressed again while what it did goes on; what fails is shown behind it.
 export function Button({ onClick, isPrimary, isQuiet, disabled, label, title, children }) {
@@ -19,7 +19,7 @@ export function Button({ onClick, isPrimary, isQuiet, disabled, label, title, ch
     try {
       await done;
     } catch (problem) {
-      if (problem.name !== "AbortError") setError(problem);
+      setError(problem);
     } finally {
       setIsBusy(false);
     }
@@ -67,6 +67,9 @@ export function CopyButton({ text, label = "Copy" }) {
   return html`<button type="button" class="quiet" onClick=${copy}>${state ?? label}</button>`;
 }
 
+// Rows of cells as spreadsheets take them.
+export const tabbed = (rows) => rows.map((cells) => cells.join("\t")).join("\n");
+
 // Lines to copy, with the button that copies them.
 export const CodeBlock = ({ text }) =>
   html`<div class="code-box">
@@ -91,6 +94,7 @@ export const faultText = ({ detail, did_you_mean: meant }) =>
 
 // What went wrong, with every fault and its place, as the service said it.
 export const Failure = ({ error, onRetry }) => {
+  if (error.name === "AbortError") return null; // its page was left
   const { title, errors, message, detail, status } = reason(error);
   return html`<${Notice} kind="bad" title=${title ?? "That did not work"}>
     ${
@@ -140,8 +144,7 @@ export function Help({ name, place = places[name] }) {
 
 // One sentence in a box beside its "?"; Escape and a click elsewhere close it.
 function Hint({ name }) {
-  const id = useRef(null);
-  id.current ??= freshId("hint");
+  const id = useId("hint");
   const [sentence, place] = hints[name];
   const put = ({ newState, currentTarget: box }) => {
     if (newState !== "open") return;
@@ -152,12 +155,12 @@ function Hint({ name }) {
   return html`<button
       type="button"
       class="help"
-      popovertarget=${id.current}
+      popovertarget=${id}
       aria-label=${`What is it: ${name}`}
     >
       ?
     </button>
-    <div class="hint-box" popover="auto" id=${id.current} onToggle=${put}>
+    <div class="hint-box" popover="auto" id=${id} onToggle=${put}>
       <p>${sentence}</p>
       <a href=${guideLink(place)}>More in the guide</a>
     </div>`;
@@ -175,8 +178,7 @@ export const Panel = ({ title, help = title, actions, children }) =>
 
 // Tabs over panels: [{name, title, view()}]; only the chosen one is made. Arrow keys move between tabs.
 export function Tabs({ label, tabs, chosen, onChoose }) {
-  const id = useRef(null);
-  id.current ??= freshId("tabs");
+  const id = useId("tabs");
   const at = Math.max(
     0,
     tabs.findIndex((tab) => tab.name === chosen),
@@ -196,9 +198,9 @@ export function Tabs({ label, tabs, chosen, onChoose }) {
           html`<button
             type="button"
             role="tab"
-            id=${`${id.current}-${tab.name}`}
+            id=${`${id}-${tab.name}`}
             aria-selected=${index === at}
-            aria-controls=${`${id.current}-panel`}
+            aria-controls=${`${id}-panel`}
             tabindex=${index === at ? 0 : -1}
             onClick=${() => onChoose(tab.name)}
           >
@@ -208,8 +210,8 @@ export function Tabs({ label, tabs, chosen, onChoose }) {
     </div>
     <div
       role="tabpanel"
-      id=${`${id.current}-panel`}
-      aria-labelledby=${`${id.current}-${tabs[at].name}`}
+      id=${`${id}-panel`}
+      aria-labelledby=${`${id}-${tabs[at].name}`}
       tabindex="0"
     >
       ${tabs[at].view()}
@@ -283,6 +285,21 @@ export const withSubscripts = (text) =>
     .split(/\b([A-Za-z])_([a-z])\b/)
     .map((part, at) => (at % 3 === 2 ? html`<sub>${part}</sub>` : part));
 
+// A field for a file; the same file may be chosen again.
+export const FileInput = ({ inputRef, ...attributes }) =>
+  html`<input
+    type="file"
+    ref=${inputRef}
+    ...${attributes}
+    onClick=${(event) => {
+      event.currentTarget.value = "";
+    }}
+  />`;
+
+// {value, label} of values, for a choice among them.
+export const optionsOf = (values, write = words) =>
+  values.map((value) => ({ value, label: write(value) }));
+
 // Headline numbers: [{label, value, note, tone, help, place}], `help` a name of help.js, `place` one of the guide.
 export const Headlines = ({ items }) =>
   html`<dl class="headlines">
@@ -298,7 +315,17 @@ export const Headlines = ({ items }) =>
     )}
   </dl>`;
 
-// Names with their values: [[name, value]]. Further options are attributes of the list.
+// Facts, a line each: [[name, value]].
+export const Facts = ({ pairs }) =>
+  html`<dl class="list">
+    ${pairs.map(
+      ([name, value]) =>
+        html`<dt>${name}</dt>
+          <dd>${value}</dd>`,
+    )}
+  </dl>`;
+
+// Names with their values beside each other: [[name, value]]. Further options are attributes of the list.
 export const Figures = ({ pairs, className = "", ...attributes }) =>
   html`<dl class=${`figures ${className}`} ...${attributes}>
     ${pairs.map(

@@ -1,8 +1,8 @@
 // Tables of results: one unit for a column, decimals aligned, sorted by a click on a heading, filtered by words, copied.
 import { html, useMemo, useState } from "./preact.js";
 import { settings } from "../settings.js";
-import { CopyButton, withSubscripts } from "./controls.js";
-import { useStore } from "./store.js";
+import { CopyButton, tabbed, withSubscripts } from "./controls.js";
+import { useStore } from "./hooks.js";
 import { number, pretty, scale } from "../units.js";
 
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
@@ -108,12 +108,10 @@ export function Table({
     return isLong(column, at) ? "long" : null;
   });
   const lines = () =>
-    [
+    tabbed([
       columns.map((column) => `${column.label}${column.unit ? ` [${column.unit}]` : ""}`),
       ...shown.map((row) => columns.map((column) => column.value(row) ?? "")),
-    ]
-      .map((cells) => cells.join("\t"))
-      .join("\n");
+    ]);
   const sort = (at) =>
     setOrder({ column: at, direction: order.column === at ? -order.direction : 1 });
   const ariaSort = (at) => {

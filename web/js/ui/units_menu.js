@@ -3,7 +3,7 @@ import { settings, unitSettings } from "../settings.js";
 import { pretty } from "../units.js";
 import { Choice } from "./controls.js";
 import { html, render } from "./preact.js";
-import { useStore } from "./store.js";
+import { useStore } from "./hooks.js";
 
 function Settings() {
   const chosen = useStore(settings);
