@@ -105,13 +105,13 @@ test("Every example goes through the form unchanged", async ({ page, daemon, url
   await clearance(page).waitFor();
   const changed = await page.evaluate(async () => {
     const from = (name) => import(new URL(`web/js/${name}.js`, document.baseURI).href);
-    const [{ makeDraft }, { SceneForm }, { get, schema }, { html, render }] = await Promise.all(
+    const [{ makeDraft }, { SceneForm }, { get, getSchema }, { html, render }] = await Promise.all(
       [from("form/draft"), from("scene/steps"), from("api"), from("ui/preact")]);
     const told = [], shown = [];
     for (const { name, scene } of (await get("v1/examples")).examples) {
       const host = document.body.appendChild(document.createElement("div"));
       const draft = makeDraft(structuredClone(scene));
-      render(html`<${SceneForm} schema=${await schema("scene")} draft=${draft} widgets=${[]} />`, host);
+      render(html`<${SceneForm} schema=${await getSchema("scene")} draft=${draft} widgets=${[]} />`, host);
       shown.push({ name, scene, host, draft });
     }
     for (const { name, scene, host, draft } of shown) {

@@ -128,7 +128,7 @@ export async function runScene(scene) {
 
 // A JSON Schema by name, asked for once.
 const schemas = new Map();
-export function schema(name) {
+export function getSchema(name) {
   if (!schemas.has(name)) schemas.set(name, get(`schemas/${name}`, null, null));
   schemas.get(name).catch(() => schemas.delete(name));
   return schemas.get(name);

@@ -1,7 +1,7 @@
 // From a drop test to a revision that can be simulated with: readings typed, evaluated while they are typed, kept, and proposed
 // as the next revision.
 import { go, link } from "../address.js";
-import { ask, post, schema as schemaNamed } from "../api.js";
+import { ask, post, getSchema } from "../api.js";
 import { makeDraft } from "../form/draft.js";
 import { focusField } from "../form/form.js";
 import { Loaded, Notice, Panel, withSubscripts } from "../ui/controls.js";
@@ -180,7 +180,7 @@ function DropTestPage({ address: { path: parts, query } }) {
   const loaded = useLoaded(
     async (own) => {
       const material = await readMaterial(slug, null, own);
-      return { material, schema: await schemaNamed("measurement") };
+      return { material, schema: await getSchema("measurement") };
     },
     [slug, measurement],
   );

@@ -1,6 +1,6 @@
 // One material: its numbers and how sure they are, k_b and c_b for a pair of masses, drop tests, revisions and their history.
 import { link } from "../address.js";
-import { get, schema } from "../api.js";
+import { get, getSchema } from "../api.js";
 import { Facts, Headlines, Loaded, Panel } from "../ui/controls.js";
 import { pageOf } from "../ui/page.js";
 import { html } from "../ui/preact.js";
@@ -36,7 +36,7 @@ async function load(slug, revision, signal) {
     list("/history"),
     list(`@${material.revision}/used-by`),
     list("/measurements"),
-    schema("material_revision"),
+    getSchema("material_revision"),
   ]);
   return { material, revisions, steps: history, used, tests, properties };
 }

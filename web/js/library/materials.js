@@ -2,8 +2,8 @@
 import { go, link } from "../address.js";
 import { get, post } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { Button, Failure, FileInput, Help, Loaded, Panel } from "../ui/controls.js";
-import { pageOf } from "../ui/page.js";
+import { Button, Failure, FileInput, Loaded, Panel } from "../ui/controls.js";
+import { pageOf, PageTitle } from "../ui/page.js";
 import { html, useState } from "../ui/preact.js";
 import { save } from "../ui/files.js";
 import { useCount, useLoaded } from "../ui/hooks.js";
@@ -191,10 +191,7 @@ function MaterialsPage({ address: { query } }) {
     imports,
   );
   const files = ["materials.csv", "materials.json"];
-  return html`<div class="title-row">
-      <h1>Materials</h1>
-      <${Help} name="Materials" />
-    </div>
+  return html`<${PageTitle} title="Materials" />
     <p class="lead">What a laboratory measured of its buffers.</p>
     <section class="panel" aria-label="Search">
       <${Search} key=${JSON.stringify(query)} query=${query} kinds=${kinds.data ?? []} />

@@ -1,9 +1,9 @@
 // The ground motions that the server keeps: listed, and new ones uploaded.
 import { go, link } from "../address.js";
 import { get, post } from "../api.js";
-import { Help, Loaded, Panel } from "../ui/controls.js";
+import { Loaded, Panel } from "../ui/controls.js";
 import { useId, useLoaded } from "../ui/hooks.js";
-import { pageOf } from "../ui/page.js";
+import { pageOf, PageTitle } from "../ui/page.js";
 import { html } from "../ui/preact.js";
 import { Table } from "../ui/table.js";
 import { SchemaForm, widgetOf } from "./schema_form.js";
@@ -71,10 +71,7 @@ async function upload({ file, ...query }) {
 
 function RecordsPage() {
   const loaded = useLoaded((signal) => get("v1/records", { limit: LIMIT }, signal), []);
-  return html`<div class="title-row">
-      <h1>Ground motions</h1>
-      <${Help} name="Ground motions" />
-    </div>
+  return html`<${PageTitle} title="Ground motions" />
     <p class="lead">Records that shake the base of a scene; one never changes.</p>
     <section class="panel" aria-label="List">
       <${Loaded} loaded=${loaded}>

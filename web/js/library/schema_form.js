@@ -1,6 +1,6 @@
 // Forms by a schema that are sent as a whole, and those that change a material.
 import { replace } from "../address.js";
-import { post, schema as schemaNamed } from "../api.js";
+import { post, getSchema } from "../api.js";
 import { makeDraft, useNews } from "../form/draft.js";
 import { FaultList } from "../form/fault_list.js";
 import { focusField, Form } from "../form/form.js";
@@ -82,7 +82,7 @@ export function SchemaForm({ schema, value, label, send, isFocused, ...options }
 
 // The same by the name of a schema.
 export function NamedForm({ name, ...more }) {
-  const loaded = useLoaded(() => schemaNamed(name), [name]);
+  const loaded = useLoaded(() => getSchema(name), [name]);
   return html`<${Loaded} loaded=${loaded}>
     ${(schema) => html`<${SchemaForm} schema=${schema} ...${more} />`}
   <//>`;

@@ -89,15 +89,14 @@ export function Method() {
     </dl>
     ${
       plan.derived.length > 0
-        ? html`<h3>Each stop, for its pair of masses</h3>
-            <${Table}
-              caption="Each stop, for its pair of masses"
-              columns=${stops}
-              rows=${plan.derived}
-            />`
+        ? html`<${Table}
+            caption="Each stop, for its pair of masses"
+            isHeaded
+            columns=${stops}
+            rows=${plan.derived}
+          />`
         : html`<p>No damper.</p>`
     }
-    <h3>Modes of the structure</h3>
-    <${Table} caption="Modes of the structure" columns=${modes} rows=${plan.modes} />
+    <${Table} caption="Modes of the structure" isHeaded columns=${modes} rows=${plan.modes} />
     <p class="quiet">Engine ${engine}</p>`;
 }

@@ -1,7 +1,7 @@
 // A result on paper: what was asked, what came out, its charts, how it was computed. The browser prints it or saves a PDF.
 import { html } from "../ui/preact.js";
 import { link } from "../address.js";
-import { get, schema as schemaNamed } from "../api.js";
+import { get, getSchema } from "../api.js";
 import { Button, Loaded, sentence, withSubscripts } from "../ui/controls.js";
 import { useLoaded } from "../ui/hooks.js";
 import { pageOf } from "../ui/page.js";
@@ -22,7 +22,7 @@ const load = async (id, signal) => {
     get(`v1/results/${encodeURIComponent(id)}`, null, signal),
     jobsOf(id, signal),
     get("version", null, signal),
-    schemaNamed("scene"),
+    getSchema("scene"),
   ]);
   const View = result.study && (await KINDS[result.study.kind].load());
   return {

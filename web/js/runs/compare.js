@@ -1,8 +1,8 @@
 // Up to four results beside each other. In the address: a to d (results), and what comparison.js keeps there.
 import { go, link, read, replace } from "../address.js";
-import { get, runScene, schema as schemaNamed } from "../api.js";
-import { Button, Failure, Help, IconButton, Loaded } from "../ui/controls.js";
-import { pageOf } from "../ui/page.js";
+import { get, runScene, getSchema } from "../api.js";
+import { Button, Failure, IconButton, Loaded } from "../ui/controls.js";
+import { pageOf, PageTitle } from "../ui/page.js";
 import { html, useEffect, useRef } from "../ui/preact.js";
 import { useLoaded, useQuery } from "../ui/hooks.js";
 import { brief, uncapital } from "../units.js";
@@ -83,11 +83,9 @@ function ComparePage({ address }) {
   }, [known.data, address]);
   const isCurrent = !loaded.isLoading && loaded.data?.runs.length === ids.length;
   const labels = isCurrent ? loaded.data.runs.map(({ label }) => label) : [];
-  return html`<div class="title-row">
-      <h1>Compare</h1>
-      <${Help} name="Compare" />
+  return html`<${PageTitle} title="Compare">
       <${Chosen} ids=${ids} labels=${labels} names=${known.data ?? new Map()} />
-    </div>
+    <//>
     ${known.error && html`<${Failure} error=${known.error} />`}
     ${
       ids.length < 2
@@ -129,7 +127,7 @@ async function loadRun(id, signal) {
 // {runs, pairs, inputs}: `pairs` are the others against the first, as the service compares them; `inputs` those that differ.
 async function loadComparison(ids, signal) {
   const [schema, ...runs] = await Promise.all([
-    schemaNamed("scene"),
+    getSchema("scene"),
     ...ids.map((id) => loadRun(id, signal)),
   ]);
   const [first, ...others] = runs;

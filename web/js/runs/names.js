@@ -1,5 +1,5 @@
 // Names that tell runs apart: their own titles, else what differs in their scenes.
-import { get, schema as schemaNamed } from "../api.js";
+import { get, getSchema } from "../api.js";
 import { capital, moment, pretty, words } from "../units.js";
 import { materialOf, valueText } from "./scene_name.js";
 import { unitAt, valuesOf } from "../scene/inputs.js";
@@ -78,7 +78,7 @@ export const lettered = (ids) =>
 // The latest results by their ids: a name that tells each from the others, and when it ended.
 export async function latestResults(limit) {
   const query = { status: "successful", kind: "none", limit, details: 1 };
-  const [{ jobs }, schema] = await Promise.all([get("v1/jobs", query), schemaNamed("scene")]);
+  const [{ jobs }, schema] = await Promise.all([get("v1/jobs", query), getSchema("scene")]);
   const there = jobs.filter((job) => job.result && !job.result_deleted);
   const names = namesOf(there, schema);
   const found = new Map();

@@ -1,10 +1,10 @@
 // The runs, newest first: their inputs where these vary, their metrics, what became of each. In the address: q (words), status,
 // kind (of study), sort ("-impacts" downwards), before (a page of older ones).
 import { jobPath, link } from "../address.js";
-import { ask, remove, schema as schemaNamed } from "../api.js";
+import { ask, remove, getSchema } from "../api.js";
 import { announce } from "../ui/announce.js";
-import { Button, Help, Loaded } from "../ui/controls.js";
-import { pageOf } from "../ui/page.js";
+import { Button, Loaded } from "../ui/controls.js";
+import { pageOf, PageTitle } from "../ui/page.js";
 import { html, useEffect, useState } from "../ui/preact.js";
 import { useCount, useLoaded, useQuery } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
@@ -34,7 +34,7 @@ async function listJobs(query, signal) {
 // Words are looked for in what the page shows; with older pages the service looks through their titles too.
 async function loadJobs({ q, status, kind, before }, signal) {
   const query = { status, kind, before, details: 1 };
-  const [list, schema] = await Promise.all([listJobs(query, signal), schemaNamed("scene")]);
+  const [list, schema] = await Promise.all([listJobs(query, signal), getSchema("scene")]);
   const more = q && list.next ? await listJobs({ ...query, q }, signal) : { jobs: [] };
   const known = new Set(list.jobs.map((job) => job.id));
   return {
@@ -247,10 +247,7 @@ function RunsPage() {
     setChosen(new Set());
     reload();
   };
-  return html`<div class="title-row">
-      <h1>Runs</h1>
-      <${Help} name="Runs" />
-    </div>
+  return html`<${PageTitle} title="Runs" />
     <${Filters} query=${query} onChange=${(changes) => change({ ...changes, before: null })} />
     <div class="runs">
       <${Loaded} loaded=${loaded}>

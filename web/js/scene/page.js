@@ -1,5 +1,5 @@
 // A scene: described at the left, drawn and live at the right, run from here.
-import { schema as schemaNamed } from "../api.js";
+import { getSchema } from "../api.js";
 import { FaultList } from "../form/fault_list.js";
 import { focusField } from "../form/form.js";
 import { Failure, Figures, Help, IconButton, Loaded, Panel } from "../ui/controls.js";
@@ -44,7 +44,7 @@ function listen({ past, run }, signal) {
 
 function ScenePage({ address, signal }) {
   const session = useMemo(() => makeSession(signal), []);
-  const schema = useLoaded(() => schemaNamed("scene"), []);
+  const schema = useLoaded(() => getSchema("scene"), []);
   const [hasExamples, setHasExamples] = useState(false);
   const steps = useRef(null);
   const { draft, past } = session;

@@ -12,11 +12,11 @@ import {
   Bars,
   Decision,
   SceneLink,
-  between,
+  intervals,
   pointerOf,
   quantities,
-  remarksOf,
   remarkText,
+  remarksOf,
 } from "./parts.js";
 
 // "25 ± 0.03 ms"
@@ -116,10 +116,7 @@ function Parameters({ parameters }) {
     { label: "Parameter", value: (one) => title(labelOf(pointerOf(one))) },
     quantities("Value", ({ value }) => value),
     quantities("Standard error", (one) => one.standard_error, 3),
-    {
-      label: "95 %",
-      value: ({ interval_95: interval, unit }) => (interval ? between(...interval, unit) : null),
-    },
+    intervals("95 %", (one) => one.interval_95),
     { label: "Identifiable", value: ({ identifiable }) => yesNo[identifiable] ?? null },
   ];
   return html`<${Table} caption="Parameters" columns=${columns} rows=${parameters} />`;

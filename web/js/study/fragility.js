@@ -6,7 +6,7 @@ import { useResult } from "../result/context.js";
 import { Choice } from "../ui/controls.js";
 import { Table } from "../ui/table.js";
 import { number, quantity, title, words } from "../units.js";
-import { Decision, between, quantities, remarksOf } from "./parts.js";
+import { Decision, between, intervals, quantities, remarksOf } from "./parts.js";
 
 const STEPS = 200;
 
@@ -165,16 +165,17 @@ function Limits({ limits, unitOf }) {
     { label: "Metric", value: ({ metric }) => title(metric) },
     quantities("Limit", ({ value }) => value, 4, unitOf),
     { label: "Median", unit: "m/s^2", value: ({ median }) => median },
-    {
-      label: "95 % of the median",
-      value: ({ median_interval_95: interval }) =>
-        interval ? between(...interval, "m/s^2") : null,
-    },
+    intervals(
+      "95 % of the median",
+      (one) => one.median_interval_95,
+      () => "m/s^2",
+    ),
     { label: "Dispersion", isNumeric: true, value: ({ dispersion }) => dispersion },
-    {
-      label: "95 % of the dispersion",
-      value: ({ dispersion_interval_95: interval }) => (interval ? between(...interval, "") : null),
-    },
+    intervals(
+      "95 % of the dispersion",
+      (one) => one.dispersion_interval_95,
+      () => "",
+    ),
     { label: "Records that exceed it", isNumeric: true, value: ({ exceeded }) => exceeded },
   ];
   return html`<${Table} caption="Limits" columns=${columns} rows=${limits} />`;

@@ -3,21 +3,31 @@
 import { labelOf } from "../runs/names.js";
 import { valueText } from "../runs/scene_name.js";
 import { html, useMemo } from "../ui/preact.js";
-import { get, schema as schemaNamed } from "../api.js";
+import { get, getSchema } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
 import { unitAt } from "../scene/inputs.js";
 import { useLoaded } from "../ui/hooks.js";
 import { Table } from "../ui/table.js";
-import { quantity, share, title, words } from "../units.js";
+import { quantity, title, words } from "../units.js";
 import { UpwardTitle, levelsOf, shade } from "./contours.js";
-import { Bars, Decision, SceneLink, between, pointerOf, quantities, remarksOf } from "./parts.js";
+import {
+  Bars,
+  Decision,
+  SceneLink,
+  between,
+  compared,
+  intervals,
+  pointerOf,
+  quantities,
+  remarksOf,
+} from "./parts.js";
 import { extentOf } from "../chart/scale.js";
 
 export function OptimizeStudy() {
   const { result, path } = useResult();
   const { study, units } = result;
-  const schema = useLoaded(() => schemaNamed("scene"), []);
+  const schema = useLoaded(() => getSchema("scene"), []);
   const unitOf = (one) => (schema.data ? unitAt(schema.data, pointerOf(one)) : undefined);
   const values = (list) =>
     list.map((one) => `${labelOf(pointerOf(one))} ${valueText(one.value, unitOf(one))}`).join(", ");
@@ -48,11 +58,8 @@ function decisionOf({ best, given, undamped, objectives }, units, values) {
     [given.metrics[metric], "the given scene"],
     [undamped?.metrics[metric], "the structure without dampers"],
   ]
-    .filter(([reference]) => reference > 0)
-    .map(([reference, name]) => {
-      const part = 1 - value / reference;
-      return `${share(Math.abs(part))} ${part >= 0 ? "below" : "above"} ${name}`;
-    });
+    .map(([reference, name]) => compared(value, reference, name))
+    .filter(Boolean);
   const range = interval ? ` (95 %: ${between(...interval, unit)})` : "";
   const isSingle = objectives.length === 1;
   const lead = isSingle ? "Best" : "A good compromise";
@@ -201,19 +208,23 @@ function Region({ region, unitOf }) {
     quantities("To", ({ high }) => high, 4, unitOf),
   ];
   const rows = region.filter(({ low }) => low !== null);
-  return html`<h3>Within 2 % of the best</h3>
-    <${Table} caption="Within 2 % of the best" columns=${columns} rows=${rows} />`;
+  return html`<${Table}
+    caption="Within 2 % of the best"
+    isHeaded
+    columns=${columns}
+    rows=${rows}
+  />`;
 }
 
 function Rivals({ rivals, unit, values }) {
   const columns = [
     { label: "Values", value: (one) => values(one.values) },
     { label: "Worse by", unit, value: ({ difference }) => difference },
-    {
-      label: "95 %",
-      value: ({ interval_95: interval }) => (interval ? between(...interval, unit) : null),
-    },
+    intervals(
+      "95 %",
+      (one) => one.interval_95,
+      () => unit,
+    ),
   ];
-  return html`<h3>What comes close</h3>
-    <${Table} caption="What comes close" columns=${columns} rows=${rivals} />`;
+  return html`<${Table} caption="What comes close" isHeaded columns=${columns} rows=${rivals} />`;
 }

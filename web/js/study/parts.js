@@ -6,7 +6,7 @@ import { extentOf } from "../chart/scale.js";
 import { Button, Choice, Failure, optionsOf, withSubscripts } from "../ui/controls.js";
 import { labelOf } from "../runs/names.js";
 import { useLoaded } from "../ui/hooks.js";
-import { quantity, readable, title } from "../units.js";
+import { quantity, readable, share, title } from "../units.js";
 
 // The scene alone, without its study.
 export const plainScene = ({ study, ...scene }) => scene;
@@ -22,6 +22,14 @@ export const remarksOf = ({ warnings }) =>
   warnings.map(({ pointer, detail }) =>
     remarkText(/^(may|is|has) /.test(detail) ? `${labelOf(pointer)} ${detail}` : detail),
   );
+
+// "12 % below the given scene"; null without a reference.
+export function compared(value, reference, name) {
+  if (!(reference > 0)) return null;
+  const part = 1 - value / reference;
+  if (Math.abs(part) < 0.0005) return `as ${name}`;
+  return `${share(Math.abs(part))} ${part > 0 ? "below" : "above"} ${name}`;
+}
 
 export const between = (low, high, unit) =>
   `${quantity(low, unit, 3)} to ${quantity(high, unit, 3)}`;
@@ -40,6 +48,15 @@ export const quantities = (label, value, digits, unitOf = ({ unit }) => unit) =>
   isNumeric: true,
   value,
   cell: (row) => quantity(value(row), unitOf(row), digits),
+});
+
+// A column of intervals [low, high]; null where one is not known.
+export const intervals = (label, intervalOf, unitOf = ({ unit }) => unit) => ({
+  label,
+  value: (row) => {
+    const interval = intervalOf(row);
+    return interval ? between(...interval, unitOf(row)) : null;
+  },
 });
 
 // A link to the form with the scene that load() brings: the address holds it.

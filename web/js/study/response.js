@@ -4,8 +4,8 @@ import { html, useMemo } from "../ui/preact.js";
 import { Chart } from "../chart/chart.js";
 import { useResult } from "../result/context.js";
 import { Table } from "../ui/table.js";
-import { quantity, share, title, yesNo } from "../units.js";
-import { Decision, MetricChoice, pointerOf, remarksOf } from "./parts.js";
+import { quantity, title, yesNo } from "../units.js";
+import { Decision, MetricChoice, compared, pointerOf, remarksOf } from "./parts.js";
 import { labelOf } from "../runs/names.js";
 
 const METRICS = ["peak_displacement", "rms_displacement"];
@@ -74,9 +74,9 @@ function decisionOf(points, name, unit) {
   if (!worst) return "No motion was found.";
   const at = `${quantity(worst.peak_displacement, "m")} at ${name} ${quantity(worst.value, unit)}`;
   if (!bare) return `The largest displacement is ${at}.`;
-  const part = 1 - worst.peak_displacement / bare.undamped_peak_displacement;
-  const against = `${share(Math.abs(part))} ${part > 0 ? "below" : "above"} the largest without dampers (${quantity(bare.undamped_peak_displacement, "m")} at ${quantity(bare.value, unit)})`;
-  return `The largest displacement is ${at}, ${against}.`;
+  const { undamped_peak_displacement: peak, value } = bare;
+  const against = compared(worst.peak_displacement, peak, "the largest without dampers");
+  return `The largest displacement is ${at}, ${against} (${quantity(peak, "m")} at ${quantity(value, unit)}).`;
 }
 
 export function ResponseStudy() {

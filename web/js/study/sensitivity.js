@@ -91,12 +91,12 @@ function Spread({ statistics, made, errors }) {
       cell: (row) => share((row.q95 - row.q05) / Math.abs(row.value || 1)),
     },
   ];
-  return html`<h3>${`The response of ${made} runs with ${errors}`}</h3>
-    <${Table}
-      caption=${`The response of ${made} runs with ${errors}`}
-      columns=${columns}
-      rows=${statistics}
-    />`;
+  return html`<${Table}
+    caption=${`The response of ${made} runs with ${errors}`}
+    isHeaded
+    columns=${columns}
+    rows=${statistics}
+  />`;
 }
 
 function Spectrum({ spectrum: { channel, unit, value, median, q05, q95 }, frequency }) {
@@ -134,6 +134,10 @@ function Contacts({ contacts }) {
     part("k_b", "stiffness", "N/m"),
     part("c_b", "damping", "N s/m"),
   ];
-  return html`<h3>Each stop's stiffness and damping</h3>
-    <${Table} caption="Each stop's stiffness and damping" columns=${columns} rows=${contacts} />`;
+  return html`<${Table}
+    caption="Each stop's stiffness and damping"
+    isHeaded
+    columns=${columns}
+    rows=${contacts}
+  />`;
 }

@@ -5,10 +5,10 @@ import { get, post, submit } from "../api.js";
 import { Chart } from "../chart/chart.js";
 import { Choice, Loaded, Notice } from "../ui/controls.js";
 import { useLoaded } from "../ui/hooks.js";
-import { number, quantity, share } from "../units.js";
+import { number, quantity } from "../units.js";
 import { useResult } from "../result/context.js";
 import { Contours } from "./contours.js";
-import { Decision, JobButton, SceneLink } from "./parts.js";
+import { Decision, JobButton, SceneLink, compared } from "./parts.js";
 import { Point, Points } from "./sweep_points.js";
 import {
   bestRow,
@@ -60,13 +60,6 @@ function referencesOf(metric, given) {
   const reduction = given.summary[`${metric.key}_reduction`];
   const bare = Number.isFinite(reduction) && reduction < 1 ? value / (1 - reduction) : undefined;
   return { value, bare };
-}
-
-function compared(value, reference, name) {
-  if (!(reference > 0)) return null;
-  const part = 1 - value / reference;
-  if (Math.abs(part) < 0.0005) return `as ${name}`;
-  return `${share(Math.abs(part))} ${part > 0 ? "below" : "above"} ${name}`;
 }
 
 // In a sweep of loads alone there is nothing to choose: what it leads to is the worst one.

@@ -1,7 +1,17 @@
-// A page whose view is a component: View({address, signal}) is drawn again when the query of its address or the units change.
+// Pages: their headings, and a page whose view is a component.
 import { session } from "../api.js";
+import { Help } from "./controls.js";
 import { html, render } from "./preact.js";
 
+// The heading of a page with its "?"; `children` stand beside it.
+export const PageTitle = ({ title, children }) =>
+  html`<div class="title-row">
+    <h1>${title}</h1>
+    <${Help} name=${title} />
+    ${children}
+  </div>`;
+
+// View({address, signal}) is drawn again when the query of its address or the units change.
 export const pageOf = (title, View) => ({
   title,
   show(host, address, signal) {

@@ -50,12 +50,13 @@ function compare(a, b) {
   return a - b;
 }
 
-// A table of `rows`. A column is {label, value(row), unit, digits, cell(row), isNumeric}: `value` is what is sorted and
+// A table of `rows`; its caption is seen where `isHeaded`. A column is {label, value(row), unit, digits, cell(row), isNumeric}: `value` is what is sorted and
 // copied; numbers are written in the column's unit, or as `cell` shows them where it returns something. `filter` shows a field whose words rows must
 // contain; `selection` is {chosen: Set of keys, toggle(row)}, with `keyOf(row)`; `chosenKey` marks a row. The table keeps its
 // order, {column: index, direction: 1 or -1}, unless `order` and `onOrder` do. `tools` stand above it.
 export function Table({
   caption,
+  isHeaded,
   columns,
   rows,
   filter,
@@ -118,64 +119,69 @@ export function Table({
     if (order.column !== at) return "none";
     return order.direction > 0 ? "ascending" : "descending";
   };
-  return html`<div class="table">
-    <div class="table-tools">
-      ${tools}
-      ${filter && html`<input type="search" placeholder=${filter} aria-label=${filter} value=${words} onInput=${(event) => setWords(event.currentTarget.value)} />`}
-      ${rows.length > 0 && html`<${CopyButton} text=${lines} label="Copy" />`}
-    </div>
-    <div class="scroll" tabindex="0" role="region" aria-label=${caption}>
-      <table>
-        <caption class="visually-hidden">
-          ${caption}
-        </caption>
-        <thead>
-          <tr>
-            ${selection && html`<th scope="col"><span class="visually-hidden">Choose</span></th>`}
-            ${columns.map(
-              (column, at) =>
-                html`<th scope="col" class=${kinds[at]} aria-sort=${ariaSort(at)}>
-                  <button type="button" class="sort" onClick=${() => sort(at)}>
-                    ${withSubscripts(headOf(column, at))}
-                  </button>
-                </th>`,
+  return html`${isHeaded && html`<h3>${caption}</h3>`}
+    <div class="table">
+      <div class="table-tools">
+        ${tools}
+        ${filter && html`<input type="search" placeholder=${filter} aria-label=${filter} value=${words} onInput=${(event) => setWords(event.currentTarget.value)} />`}
+        ${rows.length > 0 && html`<${CopyButton} text=${lines} label="Copy" />`}
+      </div>
+      <div class="scroll" tabindex="0" role="region" aria-label=${caption}>
+        <table>
+          <caption class="visually-hidden">
+            ${caption}
+          </caption>
+          <thead>
+            <tr>
+              ${selection && html`<th scope="col"><span class="visually-hidden">Choose</span></th>`}
+              ${columns.map(
+                (column, at) =>
+                  html`<th scope="col" class=${kinds[at]} aria-sort=${ariaSort(at)}>
+                    <button type="button" class="sort" onClick=${() => sort(at)}>
+                      ${withSubscripts(headOf(column, at))}
+                    </button>
+                  </th>`,
+              )}
+            </tr>
+          </thead>
+          <tbody>
+            ${shown.map(
+              (row) =>
+                html`<tr
+                  key=${keyOf?.(row)}
+                  class=${keyOf && chosenKey !== undefined && keyOf(row) === chosenKey ? "chosen" : null}
+                  onClick=${onRow && (() => onRow(row))}
+                >
+                  ${
+                    selection &&
+                    html`<td>
+                      <input
+                        type="checkbox"
+                        aria-label=${`Choose ${columns[0].value(row)}`}
+                        checked=${selection.chosen.has(keyOf(row))}
+                        onChange=${() => selection.toggle(row)}
+                      />
+                    </td>`
+                  }
+                  ${columns.map((column, at) => {
+                    const content = column.cell?.(row) ?? textOf(column, row, at);
+                    return at === 0
+                      ? html`<th
+                          scope="row"
+                          class=${kinds[at]}
+                          data-label=${shortHeadOf(column, at)}
+                        >
+                          ${content}
+                        </th>`
+                      : html`<td class=${kinds[at]} data-label=${shortHeadOf(column, at)}>
+                          ${content}
+                        </td>`;
+                  })}
+                </tr>`,
             )}
-          </tr>
-        </thead>
-        <tbody>
-          ${shown.map(
-            (row) =>
-              html`<tr
-                key=${keyOf?.(row)}
-                class=${keyOf && chosenKey !== undefined && keyOf(row) === chosenKey ? "chosen" : null}
-                onClick=${onRow && (() => onRow(row))}
-              >
-                ${
-                  selection &&
-                  html`<td>
-                    <input
-                      type="checkbox"
-                      aria-label=${`Choose ${columns[0].value(row)}`}
-                      checked=${selection.chosen.has(keyOf(row))}
-                      onChange=${() => selection.toggle(row)}
-                    />
-                  </td>`
-                }
-                ${columns.map((column, at) => {
-                  const content = column.cell?.(row) ?? textOf(column, row, at);
-                  return at === 0
-                    ? html`<th scope="row" class=${kinds[at]} data-label=${shortHeadOf(column, at)}>
-                        ${content}
-                      </th>`
-                    : html`<td class=${kinds[at]} data-label=${shortHeadOf(column, at)}>
-                        ${content}
-                      </td>`;
-                })}
-              </tr>`,
-          )}
-        </tbody>
-      </table>
-      ${shown.length === 0 && html`<p class="quiet empty">${rows.length > 0 ? "No row contains these words." : empty}</p>`}
-    </div>
-  </div>`;
+          </tbody>
+        </table>
+        ${shown.length === 0 && html`<p class="quiet empty">${rows.length > 0 ? "No row contains these words." : empty}</p>`}
+      </div>
+    </div>`;
 }
