@@ -100,6 +100,37 @@ test("Chosen runs are compared, renamed and deleted", async ({ page, daemon, url
   assert.deepEqual(left, [first.id]);
 });
 
+test("A run that cannot be deleted is left with the reason; the others that were chosen go", async ({ page, daemon, url, refused }) => {
+  refused(409);
+  const scene = await daemon.example("paper_free_sponge");
+  const ids = [];
+  for (const duration of [1, 2, 3]) ids.push((await daemon.run(scene, { title: `Spare ${duration}`, duration })).id);
+  const answer = { title: "Conflict", detail: "its result is needed" };
+  await page.route(`**/v1/jobs/${ids[1]}?purge=1`, (route) => route.fulfill({ status: 409, contentType: "application/problem+json", json: answer }));
+  await page.goto(url("#/jobs?q=spare"));
+  await page.getByRole("link", { name: "Spare 3" }).waitFor();
+  await page.getByRole("button", { name: "Choose all" }).click();
+  await page.getByRole("button", { name: "Delete", exact: true }).click();
+  await page.getByRole("button", { name: "Delete for good" }).click();
+  await says(page.getByRole("alert"), /Its result is needed/);
+  await until("the others to go", async () => (await page.getByRole("row").count()) === 2);
+  assert.deepEqual((await daemon.get("/v1/jobs?q=spare")).jobs.map(({ id }) => id), [ids[1]]);
+});
+
+test("A list shows a run that begins; a list of those that run drops one that has ended", async ({ page, newPage, daemon, url }) => {
+  const link = (where, name) => where.getByRole("link", { name, exact: true });
+  const first = await submit(daemon, await slow(daemon, { title: "The first of two", duration: 2000 }));
+  await page.goto(url("#/jobs"));
+  await link(page, "The first of two").waitFor();
+  const second = await submit(daemon, await slow(daemon, { title: "The second of two", duration: 2001 }));
+  await link(page, "The second of two").waitFor();
+  const running = await newPage();
+  await running.goto(url("#/jobs?status=running"));
+  await link(running, "The first of two").waitFor();
+  for (const { id } of [second, first]) await daemon.ask("DELETE", `/v1/jobs/${id}`);
+  await link(running, "The first of two").waitFor({ state: "detached" });
+});
+
 test("A page of many runs leads to the older ones and back, and words find older ones by their titles", async ({ page, daemon, url }) => {
   const scene = await daemon.example("paper_free_sponge");
   await daemon.run(scene, { title: "The oldest of many" });

@@ -152,6 +152,8 @@ test("JSON and form are one scene; a slip is told by its line", async ({ page, u
   const now = await text.inputValue();
   await text.fill(now.replace('"duration"', 'duration'));
   await says(page.locator("main"), /line \d+ column \d+/);
+  await text.fill("5");
+  await says(page.locator("main"), /a scene is an object/);
   await text.fill(now.replace("0.015", "0.025"));
   await page.getByRole("heading", { name: "The scene as JSON" }).click();
   assert.equal(await clearance(page).inputValue(), "0.025");

@@ -78,7 +78,8 @@ const prefetched = new Map();
 export function prefetch(path) {
   const answer = json(path);
   prefetched.set(path, answer);
-  answer.catch(() => {}); // who gets it hears of it
+  // The failure belongs to the page that gets it; a later page asks again.
+  answer.catch(() => prefetched.get(path) === answer && prefetched.delete(path));
 }
 
 // The answer's JSON.

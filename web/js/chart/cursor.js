@@ -1,5 +1,5 @@
 // The cursor of a chart and its tooltip. Charts of a group share one cursor; the tooltip is at the chart under the pointer.
-import { html, useLayoutEffect, useRef, useState } from "../ui/preact.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../ui/preact.js";
 import { useStore } from "../ui/hooks.js";
 import { createStore } from "../store.js";
 import { quantity } from "../units.js";
@@ -47,6 +47,7 @@ export function Cursor({ id, cursor, series, markers, plot, x, y }) {
   const at = useStore(cursor);
   const tip = useRef(null);
   const [tipWidth, setTipWidth] = useState(0);
+  useEffect(() => () => cursor.set(null), [cursor]); // a chart of the next page may be of this group
   useLayoutEffect(() => {
     const width = tip.current?.offsetWidth ?? 0;
     if (width !== tipWidth && width > 0) setTipWidth(width);

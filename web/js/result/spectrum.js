@@ -3,7 +3,7 @@
 import { html, useMemo } from "../ui/preact.js";
 import { get } from "../api.js";
 import { Chart } from "../chart/chart.js";
-import { Choice, Loaded, optionsOf } from "../ui/controls.js";
+import { Choice, Failure, Loaded, optionsOf } from "../ui/controls.js";
 import { useLoaded } from "../ui/hooks.js";
 import { latestResults } from "../runs/names.js";
 import { number, pretty, words } from "../units.js";
@@ -144,6 +144,7 @@ function SpectrumChart({ psd, names, ids, others }) {
             >
           </div>`,
       )}
-      ${choices.length === 0 && html`<p class="quiet">There is no other result yet.</p>`}
+      ${names.error && html`<${Failure} error=${names.error} />`}
+      ${names.data && choices.length === 0 && html`<p class="quiet">There is no other result yet.</p>`}
     </details>`;
 }

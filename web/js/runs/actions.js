@@ -2,7 +2,7 @@
 import { link } from "../address.js";
 import { ask } from "../api.js";
 import { announce } from "../ui/announce.js";
-import { Button } from "../ui/controls.js";
+import { Button, Failure } from "../ui/controls.js";
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
 import { number } from "../units.js";
 import { LETTERS, lettered } from "./names.js";
@@ -58,10 +58,15 @@ function RenameForm({ row, onDone, onClose }) {
   </form>`;
 }
 
-// One after the other; those that cannot be deleted are left, and the first reason is shown.
+// One after the other; those that cannot be deleted are left. The first reason is returned.
 async function removeAll(rows) {
-  for (const row of rows) await ask("DELETE", `v1/jobs/${row.id}`, { query: { purge: 1 } });
-  announce(`Deleted: ${count(rows.length)}`);
+  const errors = [];
+  for (const row of rows)
+    await ask("DELETE", `v1/jobs/${row.id}`, { query: { purge: 1 } }).catch((error) =>
+      errors.push(error),
+    );
+  announce(`Deleted: ${count(rows.length - errors.length)}`);
+  return errors[0] ?? null;
 }
 
 const chosenText = (shown, hidden) =>
@@ -70,6 +75,7 @@ const chosenText = (shown, hidden) =>
 // The bar is there before something is chosen, so that the table does not move.
 export function Actions({ rows, hidden, isAll, onAll, onNone, onDone }) {
   const [step, setStep] = useState(null); // "rename" or "delete", before it is done
+  const [error, setError] = useState(null); // of the last deletion
   const isBusy = rows.some(isOpen);
   const isNone = rows.length === 0;
   const end = () => {
@@ -77,21 +83,30 @@ export function Actions({ rows, hidden, isAll, onAll, onNone, onDone }) {
     onDone();
   };
   const close = () => setStep(null);
+  const begin = (next) => {
+    setError(null);
+    setStep(next);
+  };
+  const removeChosen = async () => {
+    setError(await removeAll(rows));
+    end();
+  };
   if (step === "rename" && rows.length === 1)
     return html`<${RenameForm} key=${rows[0].id} row=${rows[0]} onDone=${end} onClose=${close} />`;
   if (step === "delete" && !isNone)
     return html`<div class="row" role="status">
       <span>${`Delete ${count(rows.length)} for good, with results that no other run has?`}</span>
-      <${Button} isPrimary onClick=${() => removeAll(rows).finally(end)}>Delete for good<//>
+      <${Button} isPrimary onClick=${removeChosen}>Delete for good<//>
       <${Button} isQuiet onClick=${close}>Keep<//>
     </div>`;
   return html`<div class="row" role="group" aria-label="Chosen runs">
     <span class="quiet chosen-count">${chosenText(rows.length, hidden)}</span>
     <${CompareLink} rows=${rows} />
-    <${Button} disabled=${rows.length !== 1} onClick=${() => setStep("rename")}>Rename<//>
-    <${Button} disabled=${isNone || isBusy} onClick=${() => setStep("delete")}>Delete<//>
+    <${Button} disabled=${rows.length !== 1} onClick=${() => begin("rename")}>Rename<//>
+    <${Button} disabled=${isNone || isBusy} onClick=${() => begin("delete")}>Delete<//>
     ${!isAll && html`<${Button} isQuiet onClick=${onAll}>Choose all<//>`}
     ${rows.length + hidden > 0 && html`<${Button} isQuiet onClick=${onNone}>Choose none<//>`}
+    ${error && html`<${Failure} error=${error} />`}
   </div>`;
 }
 

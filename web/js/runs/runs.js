@@ -52,11 +52,15 @@ function useProgress(loaded, query, reload) {
     if (!hasOpen) return undefined;
     const look = async () => {
       if (document.hidden) return;
-      const { jobs } = await listJobs(query, null).catch(() => ({ jobs: [] }));
-      setLatest(new Map(jobs.map((job) => [job.id, job])));
+      const answer = await listJobs(query, null).catch(() => null);
+      if (!answer) return; // the next look may have one
+      const found = new Map(answer.jobs.map((job) => [job.id, job]));
+      setLatest(found);
       const known = new Map(loaded.data.jobs.map((job) => [job.id, job]));
-      const isOther = (job) => isOpen(known.get(job.id) ?? { status: "running" }) !== isOpen(job);
-      if (jobs.some(isOther)) reload();
+      const isOther = (job) => !known.has(job.id) || isOpen(known.get(job.id)) !== isOpen(job);
+      // One that has ended may not be in a list of those that run.
+      const isGone = (job) => isOpen(job) && !found.has(job.id);
+      if (answer.jobs.some(isOther) || loaded.data.jobs.some(isGone)) reload();
     };
     const timer = setInterval(look, AGAIN_MS);
     return () => clearInterval(timer);

@@ -16,6 +16,7 @@ import { makeSession } from "./session.js";
 import { SceneForm } from "./steps.js";
 import { useNews } from "../form/draft.js";
 import { link } from "../address.js";
+import { isObject } from "./inputs.js";
 import { number, quantity, words } from "../units.js";
 
 const WIDGETS = [
@@ -147,7 +148,9 @@ function JsonText({ draft }) {
     typed.current = event.currentTarget.value;
     setFault("");
     try {
-      draft.replace(Object.assign({}, JSON.parse(typed.current)));
+      const scene = JSON.parse(typed.current);
+      if (!isObject(scene)) throw new Error("a scene is an object");
+      draft.replace(scene);
     } catch (error) {
       setFault(`No scene yet: ${error.message}`); // browsers name the line
     }
