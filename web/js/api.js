@@ -23,7 +23,7 @@ const KEY = "impactd.token";
 let signIn = null; // () -> a promise of whether there is a token now
 export const token = () => sessionStorage.getItem(KEY);
 export const setToken = (text) => sessionStorage.setItem(KEY, text);
-export const session = createStore(0); // counts tokens given by hand: what was refused before is tried again
+export const tokenChanges = createStore(0); // counts tokens given by hand: what was refused before is tried again
 export function onUnauthorised(asks) {
   signIn = asks;
 }

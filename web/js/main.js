@@ -1,7 +1,7 @@
 // Which page is shown, and what stands around it: navigation, theme, units, token. Without Preact: what the page begins with
 // is asked for before that is here.
 import { read } from "./address.js";
-import { prefetch, get, onUnauthorised, setPageSignal, session, token } from "./api.js";
+import { prefetch, get, onUnauthorised, setPageSignal, tokenChanges, token } from "./api.js";
 import { settings } from "./settings.js";
 import { connectTheme } from "./theme.js";
 import { announce } from "./ui/announce.js";
@@ -132,7 +132,7 @@ onUnauthorised(signIn);
 updateTokenButton();
 tokenButton.onclick = async () => {
   await signIn();
-  session.set((count) => count + 1);
+  tokenChanges.set((count) => count + 1);
   show();
 };
 

@@ -49,7 +49,7 @@ export function makeDraft(scene) {
       draft.epoch++;
       notify({ pointer: "" });
     },
-    say(check, faults) {
+    setCheck(check, faults) {
       Object.assign(draft, { check, faults });
       notify({ check });
     },

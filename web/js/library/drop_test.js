@@ -62,7 +62,7 @@ function useEvaluation(slug, draft, fields) {
     const evaluate = () =>
       send({ dry_run: 1 }, (answer) => {
         setResult({ answer, error: null, state: "" });
-        draft.say(answer, []);
+        draft.setCheck(answer, []);
       });
     const leave = draft.onChange(({ pointer }) => {
       if (pointer === undefined || isKeeping.current) return;

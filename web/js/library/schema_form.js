@@ -42,7 +42,7 @@ export function Faults({ error, onGo }) {
 
 // Marks the faults of a refusal at their fields.
 export function markFaults(draft, error) {
-  draft.say(null, error.errors ?? []);
+  draft.setCheck(null, error.errors ?? []);
 }
 
 const focusFault = (box) =>

@@ -95,11 +95,11 @@ export function TraceField({ pointer, schema, label, draft }) {
     const input = event.currentTarget;
     try {
       const found = readTrace(await input.files[0].text());
-      draft.say(null, []);
+      draft.setCheck(null, []);
       draft.set(place, { ...draft.get(place), ...found });
     } catch (error) {
       input.value = ""; // one that was read before still counts
-      draft.say(draft.check, [{ pointer, detail: error.message }]);
+      draft.setCheck(draft.check, [{ pointer, detail: error.message }]);
     }
   };
   return html`<div class="field">

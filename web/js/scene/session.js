@@ -3,13 +3,13 @@ import { go, jobPath } from "../address.js";
 import { check, submit } from "../api.js";
 import { makeDraft } from "../form/draft.js";
 import { createStore } from "../store.js";
-import { keep, open, sponge } from "./url.js";
+import { keep, open, initialScene } from "./url.js";
 
 const PAUSE = 250; // ms without a change
 
 // `status` is a store of {text, outcome: {answer}, {faults} or {error}, loadError, isRunning}.
 export function makeSession(signal) {
-  const draft = makeDraft(sponge());
+  const draft = makeDraft(initialScene());
   const past = makeHistory(draft);
   const status = createStore({ text: "", outcome: null, loadError: null, isRunning: false });
   let timer = null;
@@ -37,14 +37,14 @@ export function makeSession(signal) {
     } catch (error) {
       if (!isLast()) return;
       const { errors = [] } = error;
-      draft.say(null, errors);
+      draft.setCheck(null, errors);
       status.patch({ text: "", outcome: errors.length > 0 ? { faults: errors } : { error } });
     }
   }
   function settle() {
     status.patch({ text: "Being worked out …" });
     ask(check, (answer) => {
-      draft.say(answer, []);
+      draft.setCheck(answer, []);
       status.patch({ outcome: { answer } });
     });
   }
@@ -87,7 +87,7 @@ export function makeSession(signal) {
       isEdited = false;
       const mine = open(query, history.state).catch((error) => {
         if (error.name !== "AbortError") status.patch({ loadError: error });
-        return sponge();
+        return initialScene();
       });
       loading = mine;
       const scene = await mine;

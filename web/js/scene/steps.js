@@ -6,7 +6,7 @@ import { place, unitAt } from "./inputs.js";
 import { Help } from "../ui/controls.js";
 import { html, useEffect, useMemo } from "../ui/preact.js";
 import { title } from "../units.js";
-import { sponge } from "./url.js";
+import { initialScene } from "./url.js";
 import { storeyCount } from "./channels.js";
 
 const STEPS = [
@@ -78,7 +78,7 @@ function starts(draft) {
   const first = (name, otherwise) => [draft.get(`/structure/${name}`) ?? otherwise].flat(2)[0];
   const [mass, stiffness] = [first("mass", 1000), first("stiffness", 1e6)];
   const three = (value) => [value, value, value];
-  const last = draft.get("/dampers")?.at?.(-1) ?? sponge().dampers[0];
+  const last = draft.get("/dampers")?.at?.(-1) ?? initialScene().dampers[0];
   return {
     "/structure frame": {
       masses: three(mass),

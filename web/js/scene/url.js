@@ -6,7 +6,7 @@ import { storeyCount } from "./channels.js";
 const MAX_LENGTH = 100000; // characters of a link
 
 // There before anything is fetched.
-export const sponge = () => ({
+export const initialScene = () => ({
   title: "The paper's sponge, released from 15 mm",
   structure: { mass: 1.35, stiffness: 865, damping: 1.092 },
   dampers: [{ mass: 0.1107, clearance: 0.015, buffer: "sponge" }],
@@ -17,7 +17,7 @@ export const sponge = () => ({
 
 // The scene that was `left` here, else the one that the query asks for.
 export async function open({ s, example, result, job, buffer, record }, left) {
-  const { title, ...scene } = sponge();
+  const { title, ...scene } = initialScene();
   const ask = (kind, id, part = "") => get(`v1/${kind}/${encodeURIComponent(id)}${part}`);
   if (left) return left;
   if (s)
@@ -34,7 +34,7 @@ export async function open({ s, example, result, job, buffer, record }, left) {
       excitation: { kind: "record", name: record },
       duration: Math.ceil((await ask("records", record)).duration) || 1,
     };
-  return sponge();
+  return initialScene();
 }
 
 // The same scene as one would type it: materials by name, the usual channels unsaid.

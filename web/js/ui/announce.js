@@ -1,4 +1,4 @@
 // A sentence for those who listen to the page rather than see it.
 export function announce(text) {
-  document.getElementById("told").textContent = text;
+  document.getElementById("announcer").textContent = text;
 }

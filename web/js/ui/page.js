@@ -1,5 +1,5 @@
 // Pages: their headings, and a page whose view is a component.
-import { session } from "../api.js";
+import { tokenChanges } from "../api.js";
 import { Help } from "./controls.js";
 import { html, render } from "./preact.js";
 
@@ -18,8 +18,8 @@ export const pageOf = (title, View) => ({
     let current = address;
     // A new token is a new start: what was refused is asked for again.
     const redraw = () =>
-      render(html`<${View} key=${session.get()} address=${current} signal=${signal} />`, host);
-    signal.addEventListener("abort", session.subscribe(redraw));
+      render(html`<${View} key=${tokenChanges.get()} address=${current} signal=${signal} />`, host);
+    signal.addEventListener("abort", tokenChanges.subscribe(redraw));
     host.replaceChildren();
     redraw();
     return {
