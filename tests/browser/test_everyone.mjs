@@ -80,6 +80,19 @@ test("The theme is chosen by a button and stays; the link over the navigation le
   assert.equal(await page.evaluate(() => document.activeElement.id), "main");
 });
 
+test("Where the browser keeps nothing, the page works, and a theme lasts as long as it does", async ({ page, url }) => {
+  await page.addInitScript(() => {
+    const refuse = () => { throw new DOMException("refused", "SecurityError"); };
+    for (const name of ["localStorage", "sessionStorage"]) Object.defineProperty(window, name, { get: refuse });
+  });
+  await page.goto(url("#/scene"));
+  await says(page.getByRole("region", { name: "Estimate" }), /Hz/);
+  await page.getByRole("button", { name: "Use dark colours" }).click();
+  await page.getByRole("button", { name: "Use light colours" }).waitFor();
+  await page.getByRole("link", { name: "Runs" }).click();
+  await says(page.getByRole("heading", { level: 1 }), /Runs/);
+});
+
 test("Units are chosen in the header: charts, numbers and tables follow at once, and stay; the address does not change", async ({ page, daemon, url }) => {
   const result = await sponge(daemon), main = page.getByRole("main");
   const { summary } = await daemon.get(`/v1${result.hash.slice(1)}`);

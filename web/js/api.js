@@ -1,5 +1,6 @@
 // The service over HTTP: the one place that fetches. Paths of our own are written without a slash ("v1/jobs"), those of
 // answers' links as they came.
+import { tabStorage } from "./storage.js";
 import { createStore } from "./store.js";
 
 // What a problem document says (RFC 9457), or that nobody answered (status 0).
@@ -21,8 +22,8 @@ export const reason = (error) =>
 
 const KEY = "impactd.token";
 let signIn = null; // () -> a promise of whether there is a token now
-export const token = () => sessionStorage.getItem(KEY);
-export const setToken = (text) => sessionStorage.setItem(KEY, text);
+export const token = () => tabStorage.get(KEY);
+export const setToken = (text) => tabStorage.set(KEY, text);
 export const tokenChanges = createStore(0); // counts tokens given by hand: what was refused before is tried again
 export function onUnauthorised(asks) {
   signIn = asks;

@@ -2,6 +2,7 @@
 // is asked for before that is here.
 import { read } from "./address.js";
 import { prefetch, get, onUnauthorised, setPageSignal, tokenChanges, token } from "./api.js";
+import { storage } from "./storage.js";
 import { settings } from "./settings.js";
 import { connectTheme } from "./theme.js";
 import { announce } from "./ui/announce.js";
@@ -58,8 +59,8 @@ async function show() {
 // The hint of a first visit stands above the scene until it is closed or the reader goes on.
 const WELCOME = "impactd.welcome";
 function welcome(isScene) {
-  hint.hidden = !isScene || localStorage.getItem(WELCOME) !== null;
-  if (!isScene) localStorage.setItem(WELCOME, "seen");
+  hint.hidden = !isScene || storage.get(WELCOME) !== null;
+  if (!isScene) storage.set(WELCOME, "seen");
 }
 hint.querySelector("button").onclick = () => welcome(false);
 

@@ -1,4 +1,5 @@
 // What a reader prefers on every page: the units of numbers. Kept by the browser, part of no address.
+import { storage } from "./storage.js";
 import { createStore } from "./store.js";
 
 const KEY = "impactd.units";
@@ -18,7 +19,7 @@ export const unitSettings = [
 function load() {
   let kept = {};
   try {
-    kept = Object(JSON.parse(localStorage.getItem(KEY)));
+    kept = Object(JSON.parse(storage.get(KEY)));
   } catch {
     // what cannot be read counts as nothing
   }
@@ -29,4 +30,4 @@ function load() {
 
 export const settings = createStore(load()); // {length, acceleration, force}
 
-settings.subscribe((value) => localStorage.setItem(KEY, JSON.stringify(value)));
+settings.subscribe((value) => storage.set(KEY, JSON.stringify(value)));

@@ -1,4 +1,6 @@
 // Light or dark: the system's until the reader chooses; also of the guide.
+import { storage } from "./storage.js";
+
 const KEY = "impactd.theme";
 
 export function connectTheme(button) {
@@ -13,8 +15,8 @@ export function connectTheme(button) {
   }
   button.onclick = () => {
     set(isDark() ? "light" : "dark");
-    localStorage.setItem(KEY, root.dataset.theme);
+    storage.set(KEY, root.dataset.theme);
   };
   system.onchange = () => set();
-  set(localStorage.getItem(KEY));
+  set(storage.get(KEY));
 }

@@ -160,6 +160,7 @@ function Drawn(props) {
       role=${isFixed && !props.onKeyDown ? "img" : "application"}
       aria-label=${title}
       aria-describedby=${`${id}-summary`}
+      aria-keyshortcuts=${isFixed ? null : "ArrowLeft ArrowRight PageUp PageDown Plus - 0 Enter"}
       onKeyDown=${isFixed ? props.onKeyDown : (event) => handleKey(event, latest.current)}
     >
       <svg ref=${svg} width=${width} height=${outerHeight} aria-hidden="true">

@@ -1,5 +1,6 @@
 // A result in slow motion. The instant is the address' t, else the start of its impact, else that of the window; while it plays
 // the charts' cursor goes along.
+import { read } from "../address.js";
 import { html, useEffect, useMemo, useRef, useState } from "../ui/preact.js";
 import { cursorOf } from "../chart/cursor.js";
 import { Picture } from "../scene/drawing.js";
@@ -77,7 +78,15 @@ function useWindow({ result, query, shown }) {
 }
 
 // The instant: {t, isPlaying, play(on), scrub(t), writeInstant() to the address, step(side)}. A change of the address moves it.
-function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, isReady, onFrame) {
+function usePlayer(
+  { query, ledger, change, signal },
+  window,
+  pace,
+  isLooped,
+  isReady,
+  onFrame,
+  onFailure,
+) {
   const [t, setT] = useState(window.from);
   const [isPlaying, setPlaying] = useState(false);
   const isRunning = useRef(false); // at once, before it is drawn
@@ -104,6 +113,7 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
   useEffect(() => {
     const before = followed.current;
     followed.current = { t: query.t, impact: query.impact };
+    if (read().query.t !== query.t) return; // it has moved on before this effect ran: what is drawn next follows
     const isChosen = query.impact !== before.impact && query.t === before.t; // in another part of the page
     if (query.t !== undefined && !isChosen) {
       if (Number(query.t) === noted.current) return;
@@ -179,7 +189,7 @@ function usePlayer({ query, ledger, change, signal }, window, pace, isLooped, is
   const queue = useRef(Promise.resolve());
   const step = (side) => {
     queue.current = queue.current.then(async () => {
-      const row = await neighbour(ledger, now.current, side).catch(() => null);
+      const row = await neighbour(ledger, now.current, side).catch(onFailure);
       if (!row || signal.aborted) return;
       const { from, to } = latest.current.window;
       const isAway = row.start < from || row.start > to; // then no part of the time is chosen
@@ -227,7 +237,7 @@ export function Animation() {
   const cursor = cursorOf("time");
   const follow = (x) => cursor.set(x === null ? null : { x, y: null, owner: null });
   const isReady = (t) => motion.stateAt?.(t);
-  const player = usePlayer(context, window, pace, isLooped, isReady, follow);
+  const player = usePlayer(context, window, pace, isLooped, isReady, follow, setError);
   const { t, isPlaying } = player;
 
   if (motion.missing.length > 0)

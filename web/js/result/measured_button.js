@@ -2,6 +2,7 @@
 import { html, useEffect, useRef, useState } from "../ui/preact.js";
 import { Button, FileInput, IconButton, Loaded, Panel } from "../ui/controls.js";
 import { useLoaded, useStore } from "../ui/hooks.js";
+import { tabStorage } from "../storage.js";
 import { createStore } from "../store.js";
 
 const KEY = "impactd.measured.";
@@ -9,23 +10,18 @@ const stores = new Map(); // by the result: {name, text} or null
 
 // What was chosen for a result; the browser keeps it until the tab is closed.
 function storeOf(id) {
-  if (!stores.has(id))
-    stores.set(id, createStore(JSON.parse(sessionStorage.getItem(KEY + id) ?? "null")));
+  if (!stores.has(id)) stores.set(id, createStore(JSON.parse(tabStorage.get(KEY + id) ?? "null")));
   return stores.get(id);
 }
 
 async function bring(id, file) {
   const measured = { name: file.name, text: await file.text() };
   storeOf(id).set(measured);
-  try {
-    sessionStorage.setItem(KEY + id, JSON.stringify(measured));
-  } catch {
-    sessionStorage.removeItem(KEY + id); // too large to be kept over a reload
-  }
+  tabStorage.set(KEY + id, JSON.stringify(measured)); // a large one is not kept over a reload
 }
 
 function forget(id) {
-  sessionStorage.removeItem(KEY + id);
+  tabStorage.remove(KEY + id);
   storeOf(id).set(null);
 }
 

@@ -218,6 +218,7 @@ export function Motion({ onDrawn }) {
 
   return html`<section class="motion" aria-label="Motion over time" ref=${box}>
     ${loaded.error && html`<${SeriesFailure} error=${loaded.error} path=${path} />`}
+    ${!loaded.error && impacts.error && html`<${Failure} error=${impacts.error} />`}
     ${
       loaded.data &&
       drawable.map((chart, at) => {

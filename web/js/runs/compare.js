@@ -101,8 +101,6 @@ function ComparePage({ address }) {
     }`;
 }
 
-export const page = pageOf(() => "Compare", ComparePage);
-
 async function loadRun(id, signal) {
   const load = (name, query) => get(`v1/results/${encodeURIComponent(id)}${name}`, query, signal);
   const result = await load("");
@@ -165,3 +163,5 @@ function differingInputs(scenes, schema) {
     ({ values }) => !values.every((value) => isSame(value, values[0])),
   );
 }
+
+export const page = pageOf(() => "Compare", ComparePage);

@@ -127,8 +127,6 @@ function EstimatePanel({ session, onGo }) {
   <//>`;
 }
 
-export const page = pageOf(() => "Scene", ScenePage);
-
 function JsonView({ draft }) {
   const [isOpen, setIsOpen] = useState(false);
   return html`<details class="panel">
@@ -200,3 +198,5 @@ function Estimate({ outcome, onGo }) {
     ? html`<${Failure} error=${error} />`
     : html`<${Answer} answer=${answer} onGo=${onGo} />`;
 }
+
+export const page = pageOf(() => "Scene", ScenePage);
