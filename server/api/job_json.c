@@ -18,6 +18,14 @@ static void job_json_put_links(Bytes *bytes, const JobView *show, bool has_resul
                    base, row->result, base, row->result);
 }
 
+// Of a failed job: without memory for the document that says why, none is stored.
+static const char *job_problem(const JobRow *row) {
+    static const char unknown[] =
+        "{\"type\": \"/problems/no-memory\", \"title\": \"Out of memory\", \"status\": 503, "
+        "\"detail\": \"the job failed, and there was no memory for the reason; submit it again\"}";
+    return row->problem == NULL && row->state == JOB_FAILED ? unknown : row->problem;
+}
+
 void job_json_put(Bytes *bytes, const JobView *show, int parts) {
     const JobRow *row = &show->row;
     const bool has_result = row->state == JOB_SUCCESSFUL && row->result[0] != '\0';
@@ -44,7 +52,7 @@ void job_json_put(Bytes *bytes, const JobView *show, int parts) {
                row->created_unix_ms > 0 ? clock_rfc3339(row->created_unix_ms).at : NULL,
                row->started_unix_ms > 0 ? clock_rfc3339(row->started_unix_ms).at : NULL,
                row->finished_unix_ms > 0 ? clock_rfc3339(row->finished_unix_ms).at : NULL,
-               row->problem);
+               job_problem(row));
     if (parts & JOB_PUT_WHOLE) {
         bytes_json(bytes,
                    ", \"plan\": %p, \"summary\": %p, \"work\": %p, \"warnings\": ", show->plan,

@@ -35,6 +35,11 @@ def test_a_failed_allocation_is_answered_503():
     assert tried("allocations", 13, "version", "material", "materials", "series csv", "derived", "export csv", "explain", "run", "material put") > 200
 
 
+def test_a_failed_job_has_a_problem():
+    """Without memory for the document that says why a job failed, the job has another one: 503, to be submitted again."""
+    assert tried("allocations", 50, "sweep", first=500) > 15
+
+
 def test_a_disk_that_does_not_answer_is_not_called_damaged():
     """check-db where a read fails, once or from then on: it says that reading failed, and not that the database is damaged."""
     campaign = commands.Campaign("EIO", 25)

@@ -1,5 +1,8 @@
 """The canonical requests that fault injection repeats: each with what prepares it and the answers that are right without a fault."""
+import contextlib
 import json
+import os
+import sqlite3
 
 import program
 
@@ -106,6 +109,22 @@ def deleted(setup, number):
     return "DELETE", f"/v1/results/{reply.json()['result']}", None, {}
 
 
+def checkpoint(setup, number):
+    """A record, after which SQLite moves its log into the database: the log is as long as it may be."""
+    path = os.path.join(setup.daemon.data, "impactd.db")
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute("PRAGMA wal_autocheckpoint = 0")
+        connection.execute("CREATE TABLE IF NOT EXISTS ballast (number INTEGER PRIMARY KEY, body BLOB)")
+        for _ in range(17):
+            connection.execute("INSERT OR REPLACE INTO ballast VALUES (1, randomblob(1048576))")
+    return REQUESTS["record"][0](setup, 10**6 + number)
+
+
+def upload(number):
+    """A record of 300 kB."""
+    return {**record(2 * 10**6 + number), "samples": [i * 37 % 1001 - 500 for i in range(60000)]}
+
+
 # name: request, the right answers
 REQUESTS = {
     "version": (get("/version"), {200}),
@@ -160,5 +179,7 @@ REQUESTS = {
     "revision": (post("/v1/materials/sponge/revisions", revision, {"If-Match": "*"}), {201}),
     "drop test": (post("/v1/materials/sponge/measurements", lambda number: {**DROPS, "comment": f"test {number}"}), {201}),
     "record": (post("/v1/records", record), {201}),
+    "upload": (post("/v1/records", upload), {201}),
+    "checkpoint": (checkpoint, {201}),
     "import": (post("/v1/materials/import", lab), {200}),
 }

@@ -46,8 +46,7 @@ def send(daemon, request):
 
 def is_temporary(job):
     """Whether a job failed of what may be better the next time."""
-    problem = job.get("problem")
-    return job["status"] == "failed" and (problem is None or problem["status"] in (500, 503, 507))
+    return job["status"] == "failed" and job["problem"]["status"] in (500, 503, 507)
 
 
 def decoded(reply):

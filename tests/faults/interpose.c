@@ -213,6 +213,13 @@ OPEN(open64, -1, (path, flags, mode), const char *path, int flags)
 OPEN(openat, at, (at, path, flags, mode), int at, const char *path, int flags)
 OPEN(openat64, at, (at, path, flags, mode), int at, const char *path, int flags)
 
+int mkstemp(char *path)
+{
+    NEXT(mkstemp);
+    bool inside = path_is_inside(-1, path);
+    return inside && file_fails(CALL_OPEN) ? -1 : opened(next(path), inside);
+}
+
 int close(int fd)
 {
     NEXT(close);
