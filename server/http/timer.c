@@ -2,6 +2,8 @@
 //
 // The lock guards the waits, which other threads end; each change is a few stores. Limits are the
 // loop's alone. `next_ns` is a lower bound of all times, so that setting a later one costs nothing.
+// libmicrohttpd 0.9.75 overlooks the end of a stream that came together with a request: shortly
+// after the answer the socket is asked for it.
 #include "server/http/timer.h"
 
 #include <pthread.h>
@@ -10,6 +12,8 @@
 #include <sys/socket.h>
 
 #include "server/util/clock.h"
+
+enum { END_CHECK_MS = 100 };
 
 struct ConnectionTimer {
     TimerList *timers;
@@ -20,6 +24,7 @@ struct ConnectionTimer {
     void *waiting;  // the suspended connection, or NULL
     atomic_bool is_woken;
     int64_t wake_ns, limit_ns; // INT64_MAX: none
+    int64_t checked_limit_ns;  // replaces limit_ns once the end of the stream was checked for
     int64_t idle_ns;           // since when it is between two requests; INT64_MAX: it is not
 };
 
@@ -58,6 +63,11 @@ static bool timer_lower_next(TimerList *timers, int64_t time_ns) {
     return false;
 }
 
+static bool descriptor_has_ended(int descriptor) {
+    char byte;
+    return recv(descriptor, &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+}
+
 int64_t timer_list_run(TimerList *timers, int64_t now_ns) {
     if (atomic_load(&timers->next_ns) > now_ns)
         return atomic_load(&timers->next_ns);
@@ -66,6 +76,9 @@ int64_t timer_list_run(TimerList *timers, int64_t now_ns) {
     for (ConnectionTimer *timer = timers->all; timer != NULL; timer = timer->next) {
         if (timer->wake_ns <= now_ns)
             timer_wake_locked(timer);
+        if (timer->limit_ns <= now_ns && now_ns < timer->checked_limit_ns &&
+            !descriptor_has_ended(timer->descriptor))
+            timer->limit_ns = timer->checked_limit_ns;
         if (timer->limit_ns <= now_ns) {
             shutdown(timer->descriptor, SHUT_RDWR);
             timer->limit_ns = INT64_MAX;
@@ -162,7 +175,9 @@ const Callback *timer_callback(const ConnectionTimer *timer) {
 
 void timer_limit(ConnectionTimer *timer, int64_t max_ms, bool is_idle) {
     const int64_t now_ns = max_ms > 0 ? clock_monotonic_ns() : 0;
-    timer->limit_ns = max_ms > 0 ? now_ns + max_ms * 1000000 : INT64_MAX;
+    const int64_t first_ms = is_idle && max_ms > END_CHECK_MS ? END_CHECK_MS : max_ms;
+    timer->limit_ns = max_ms > 0 ? now_ns + first_ms * 1000000 : INT64_MAX;
+    timer->checked_limit_ns = max_ms > 0 ? now_ns + max_ms * 1000000 : 0;
     timer->idle_ns = is_idle ? now_ns : INT64_MAX;
     (void)timer_lower_next(timer->timers, timer->limit_ns);
 }

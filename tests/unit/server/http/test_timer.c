@@ -139,6 +139,27 @@ TEST(a_peer_that_is_too_slow_is_shut_down) {
     timer_list_free(list);
 }
 
+TEST(an_idle_connection_is_closed_soon_after_its_client_ended_the_stream) {
+    int pairs[2][2];
+    char byte;
+    TimerList *list = timer_list_new(&calls, &changes);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pairs[i]), 0);
+        timer_limit(timer_take(list, pairs[i][0]), 60000, true);
+    }
+    assert_int_equal(shutdown(pairs[1][1], SHUT_WR), 0);
+    run_in(list, 1000);
+    assert_int_equal(read(pairs[0][1], &byte, 1), -1);
+    assert_int_equal(read(pairs[1][1], &byte, 1), 0);
+    run_in(list, 59000);
+    assert_int_equal(read(pairs[0][1], &byte, 1), -1);
+    run_in(list, 61000);
+    assert_int_equal(read(pairs[0][1], &byte, 1), 0);
+    for (int i = 0; i < 4; i++)
+        close(pairs[i / 2][i % 2]);
+    timer_list_free(list);
+}
+
 TEST(the_longest_idle_connection_makes_room) {
     int pairs[3][2];
     char byte;
