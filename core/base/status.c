@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/utf8.h"
+
 static const char *const status_slugs[] = {
 #define STATUS_SLUG(name, slug, title) slug,
     STATUS_LIST(STATUS_SLUG)
@@ -89,11 +91,12 @@ void text_quote(char *target, size_t size, const char *text) {
         const unsigned char c = (unsigned char)text[i];
         char piece[8];
         size_t bytes = 1;
-        if (c < 0x20 || c == '"' || c == '\\') {
+        if (utf8_length((const unsigned char *)text + i) == 0) {
+            bytes = (size_t)snprintf(piece, sizeof piece, "\xEF\xBF\xBD"); // U+FFFD
+        } else if (c < 0x20 || c == '"' || c == '\\') {
             bytes = (size_t)snprintf(piece, sizeof piece, c < 0x20 ? "\\u%04x" : "\\%c", (int)c);
         } else {
-            while (bytes < 4 && ((unsigned char)text[i + bytes] & 0xC0) == 0x80)
-                bytes++;
+            bytes = utf8_length((const unsigned char *)text + i);
             memcpy(piece, text + i, bytes);
             i += bytes - 1;
         }

@@ -414,7 +414,8 @@ static bool table_read_header(Table *table) {
         table_fault(table, "", NULL, NULL, NULL, "there are more columns than materials have");
         return false;
     }
-    if (csv->count == 1 && strpbrk(csv->cells[0].text, ";\t") != NULL) {
+    if (csv->count == 1 && csv->cells[0].fault == NULL &&
+        strpbrk(csv->cells[0].text, ";\t") != NULL) {
         table_fault(table, "1", csv->cells[0].text, NULL, NULL,
                     "cells must be separated by commas, and decimals by points");
         return false;

@@ -13,6 +13,7 @@
 #include <string.h>
 #include <wctype.h>
 
+#include "core/base/utf8.h"
 #include "server/util/dtoa.h"
 
 enum { FIRST_ROOM = 256, CHUNK = 4096 }; // bytes; numbers that room is made for at once
@@ -107,30 +108,6 @@ void bytes_reals(Bytes *bytes, const double *values, size_t count) {
         *at = '\0';
         bytes->count = (size_t)(at - bytes->at);
     }
-}
-
-// The length of the UTF-8 character at `text`, 0 where there is none: cut short, overlong, a
-// surrogate, too large.
-static size_t utf8_length(const unsigned char *text) {
-    static const struct {
-        unsigned char first, last, second_min, second_max, length;
-    } forms[] = {{0xC2, 0xDF, 0x80, 0xBF, 2}, {0xE0, 0xE0, 0xA0, 0xBF, 3},
-                 {0xE1, 0xEC, 0x80, 0xBF, 3}, {0xED, 0xED, 0x80, 0x9F, 3},
-                 {0xEE, 0xEF, 0x80, 0xBF, 3}, {0xF0, 0xF0, 0x90, 0xBF, 4},
-                 {0xF1, 0xF3, 0x80, 0xBF, 4}, {0xF4, 0xF4, 0x80, 0x8F, 4}};
-    if (text[0] < 0x80)
-        return 1;
-    for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
-        if (text[0] < forms[i].first || text[0] > forms[i].last)
-            continue;
-        if (text[1] < forms[i].second_min || text[1] > forms[i].second_max)
-            return 0;
-        for (size_t k = 2; k < forms[i].length; k++)
-            if ((text[k] & 0xC0) != 0x80)
-                return 0;
-        return forms[i].length;
-    }
-    return 0;
 }
 
 // Wide characters of East Asia (UAX #11) and pictographs, by the first three bytes of their UTF-8,

@@ -116,6 +116,12 @@ TEST(quoted_texts_stay_json_when_cut) {
     assert_string_equal(wide, "");
 }
 
+TEST(quoted_texts_are_utf_8_whatever_they_were) {
+    char text[40];
+    text_quote(text, sizeof text, "a\xFF\xC3\xA4\xC3");
+    assert_string_equal(text, "\"a\xEF\xBF\xBD\xC3\xA4\xEF\xBF\xBD\"");
+}
+
 TEST(the_digits_of_a_message_read_back) {
     char text[32];
     assert_string_equal(text_real(text, 0.1), "0.1");
