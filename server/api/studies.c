@@ -87,6 +87,12 @@ Status results_solution(App *app, const Request *request, Reply *reply, Problem 
     if (status == STATUS_OK)
         status =
             jobs_prepare(app->db, row.scene, strlen(row.scene), NULL, &given, &warnings, problem);
+    if (status == STATUS_OK &&
+        (given.study == NULL || study_kind(given.study) != study_of_route(request)))
+        status = problem_set(problem, STATUS_INTERNAL,
+                             "the result %.20s is damaged: its scene has not the study that it "
+                             "answers",
+                             row.id);
     if (status == STATUS_OK)
         status = study_make_solution(&given, answer.study, &found.simulation, problem);
     if (status == STATUS_OK) {

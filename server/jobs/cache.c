@@ -147,6 +147,19 @@ static Status outcome_load(JobManager *manager, const char *result, Outcome **ou
                : problem_set(problem, STATUS_INTERNAL, "the stored result cannot be read");
 }
 
+// Whether the blob has series of this outcome, which gets them.
+static bool series_read(const char *body, size_t size, Response *response) {
+    Columns series;
+    if (!series_blob_read(body, size, &series))
+        return false;
+    if (series.rows == response->count || series.count == 0) {
+        response->series = series;
+        return true;
+    }
+    columns_clear(&series);
+    return false;
+}
+
 // From the database, and then in memory; NULL where it is not there.
 static Outcome *series_load(JobManager *manager, const char *result) {
     char *body = NULL;
@@ -155,7 +168,7 @@ static Outcome *series_load(JobManager *manager, const char *result) {
     const uint64_t deletions = cache_deletions(manager);
     if (db_series_load(manager->db, result, &body, &size, NULL) == STATUS_OK &&
         outcome_load(manager, result, &outcome, NULL) == STATUS_OK &&
-        !series_blob_read(body, size, &outcome->response.series)) {
+        !series_read(body, size, &outcome->response)) {
         outcome_unref(outcome);
         outcome = NULL;
     }

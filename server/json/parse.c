@@ -887,9 +887,11 @@ json_t *json_parse_stored(const char *text, bool *is_out_of_memory) {
 
 json_t *json_parse_tree(const char *text, size_t size) {
     json_t *root = NULL;
-    const size_t mark = size > 0 ? scan_mark(text, size) : 0;
+    if (size == 0) // `text` may be NULL
+        return NULL;
+    const size_t mark = scan_mark(text, size);
     const Part part = {text + mark, 0, size - mark, "", STATUS_UNREADABLE};
-    if (size > 0 && part_parse(&part, &root, NULL) == STATUS_OK && json_is_object(root))
+    if (part_parse(&part, &root, NULL) == STATUS_OK && json_is_object(root))
         return root;
     json_decref(root);
     return NULL;
