@@ -11,8 +11,13 @@
 #   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
 #   faults      every allocation and file call of the canonical requests and of commands fails in turn
 #   truth       the long campaigns of tests/truth
+<<<<<<< HEAD
 #   storm       a million requests with killed clients and restarts, 10,000 cancels
 #   fuzz        mutated ground motions and material files
+=======
+#   storm       a million requests, 10,000 cancels
+#   fuzz        libFuzzer: an hour of inputs for everything that is parsed, and what the kept inputs reach
+>>>>>>> feb9935e (tests: libFuzzer targets for all that is parsed, with kept inputs that every run replays)
 #   browser     the browser tests with slow computers and late answers
 #   coverage    the lines and branches of server/ and core/ that unit and contract tests reach
 #   package     the Debian package in an empty Debian 12: install, upgrade, remove, purge
@@ -183,9 +188,10 @@ part_storm() {
 }
 
 part_fuzz() {
-    build debug
-    sized 5 300 build-debug/tests/fuzz_import
-    sized 5 300 build-debug/tests/fuzz_exchange
+    check server/packages.sh <(printf '%s\n' libclang-rt-dev llvm)
+    build fuzz
+    # 3600 s
+    sized '--seconds 9' '--seconds 3600' "$python" tests/fuzz/fuzz.py --build build-fuzz
 }
 
 # How many times slower a page's computer is, and the seed of how long its answers wait.
