@@ -407,7 +407,8 @@ static void table_read_column(Table *table, const CsvCell *cell) {
 static bool table_read_header(Table *table) {
     const CsvReader *csv = &table->csv;
     if (!csv_reader_next(&table->csv)) {
-        (void)problem_add(table->problem, STATUS_INVALID, "", "has no header of column names");
+        if (!csv->is_failed)
+            (void)problem_add(table->problem, STATUS_INVALID, "", "has no header of column names");
         return false;
     }
     if (csv->count > COLUMNS_MAX) {

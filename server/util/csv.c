@@ -89,6 +89,7 @@ static void csv_read_plain(CsvReader *csv) {
 
 // False without memory, or with more than CSV_CELLS_MAX cells.
 static bool csv_read_row(CsvReader *csv) {
+    csv->row++;
     csv->count = 0;
     csv->texts.count = 0;
     for (;;) {
@@ -105,7 +106,6 @@ static bool csv_read_row(CsvReader *csv) {
         csv->at++; // the comma
     }
     csv_skip_line_end(csv);
-    csv->row++;
     return !csv->texts.is_failed;
 }
 

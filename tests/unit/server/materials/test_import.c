@@ -32,6 +32,19 @@ static char *export_all(Db *db, bool is_table) {
     return whole;
 }
 
+TEST(a_header_of_too_many_cells_is_one_fault_in_its_row) {
+    Db *db = open_database();
+    ImportTally tally;
+    Bytes text = {.most = 0};
+    for (int i = 0; i < 3000; i++)
+        bytes_text(&text, "a,");
+    assert_int_equal(import_text(db, text.at, &tally), STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_int_equal(problem.faults[0].row, 1);
+    bytes_clear(&text);
+    db_close(db);
+}
+
 // ESC, BEL, DEL, CSI as one character, a lone CR, formulas, and texts that look like JSON.
 static const char *const unsafe[] = {
     "red \x1b[31m", "\x07", "a\x7f", "\xc2\x9b 2J", "over\rwritten", "=cmd()",    "+1",
