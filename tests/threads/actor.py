@@ -122,8 +122,12 @@ class Actor:
         self.acknowledge(status, text, result)
         return status
 
+    def draw(self):
+        """Mostly the same scene as the others."""
+        return self.chance.choices(self.scenes, (4, 1, 2))[0]
+
     def run(self):
-        body, result, _, _ = self.chance.choice(self.scenes[:2])
+        body, result, _, _ = self.chance.choices(self.scenes[:2], (4, 1))[0]
         return self.submit(body, result, self.chance.choice(WAITS))
 
     def sweep(self):
@@ -158,7 +162,7 @@ class Actor:
 
     def purge(self):
         """Removes a finished job; its result goes with the last job that has it."""
-        body, result, _, _ = self.chance.choice(self.scenes)
+        body, result, _, _ = self.draw()
         self.submit(body, result, WAITS[0])
         job, self.own = self.own, None
         if job is None:
@@ -173,12 +177,12 @@ class Actor:
 
     def delete(self):
         """409: it is being computed."""
-        _, result, _, _ = self.chance.choice(self.scenes)
+        _, result, _, _ = self.draw()
         return self.ask({204, 404, 409}, "DELETE", f"/v1/results/{result}")[0]
 
     def read(self):
         """The bytes are those of a daemon without a scheduler, whether they are kept, in the cache or computed again."""
-        _, _, path, expected = self.chance.choice(self.scenes)
+        _, _, path, expected = self.draw()
         status, text = self.ask({200, 404, 503}, "GET", path)
         assert status != 503 or self.is_ending or self.campaign.has_faults or b"while they were read; ask again" in text, text
         # A sweep that goes on has the rows so far.

@@ -1,10 +1,12 @@
 // LD_PRELOAD library that runs one thread of a program at a time: the one of the highest priority, and priorities are drawn
 // from a seed in a mapped control file, anew at random points. A thread gives up its turn while it waits for a mutex, a
-// condition, a descriptor or the disk; one that computes for long without any call loses it to the next in line.
+// condition, a descriptor or the disk; one that computes for long without any call loses it to the next in line. Now and then
+// one is stopped for some milliseconds, so that others answer whole requests meanwhile.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <link.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
@@ -21,7 +23,10 @@
 enum {
     MAX_THREADS = 256,
     PATIENCE_MS = 5, // then a turn is taken from a thread that makes no call
-    RATES = 8,       // priorities change at every 4th to every 512th point
+    RATES = 7,       // priorities change at every 2nd to every 128th point
+    STOP_RATE = 512, // a thread stops at every 512th to every 4,096th
+    STOP_RATES = 4,
+    STOP_MS = 16, // at most
 };
 
 // The control file; tests/threads/schedules.py writes the seed and reads the counts.
@@ -46,7 +51,7 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; // of what follows
 static Thread threads[MAX_THREADS];
 static size_t thread_count;
 static Thread *running;
-static uint64_t seed, chance, rate;
+static uint64_t seed, chance, rate, stop_rate;
 static _Thread_local Thread *self;
 
 static struct {
@@ -79,9 +84,31 @@ static void next_find_all(void)
     *(void **)&next.cond_broadcast = next_find("pthread_cond_broadcast");
 }
 
+// Where the program's own code is. The locks of its libraries are no points: SQLite has some hundred for each query.
+static uintptr_t code_begin, code_end;
+
+static int code_find(struct dl_phdr_info *program, size_t size, void *unused)
+{
+    (void)size, (void)unused;
+    for (size_t i = 0; i < program->dlpi_phnum; i++) {
+        const ElfW(Phdr) *part = &program->dlpi_phdr[i];
+        if (part->p_type != PT_LOAD || (part->p_flags & PF_X) == 0)
+            continue;
+        code_begin = program->dlpi_addr + part->p_vaddr;
+        code_end = code_begin + part->p_memsz;
+    }
+    return 1; // the program itself is the first
+}
+
+static bool is_own(const void *caller)
+{
+    return (uintptr_t)caller >= code_begin && (uintptr_t)caller < code_end;
+}
+
 __attribute__((constructor)) static void schedule_start(void)
 {
     next_find_all();
+    (void)dl_iterate_phdr(code_find, NULL);
     const char *file = getenv("IMPACTD_SCHEDULE");
     const int fd = file != NULL ? open(file, O_RDWR | O_CLOEXEC) : -1;
     if (fd < 0)
@@ -129,7 +156,8 @@ static void seed_read(void)
     if (now == seed)
         return;
     seed = chance = now;
-    rate = (uint64_t)4 << draw() % RATES;
+    rate = (uint64_t)2 << draw() % RATES;
+    stop_rate = (uint64_t)STOP_RATE << draw() % STOP_RATES;
     for (size_t i = 0; i < thread_count; i++)
         threads[i].priority = draw();
 }
@@ -172,6 +200,19 @@ static void turn_wait(Thread *thread)
     thread->state = THREAD_RUNNING;
 }
 
+// With the lock held, which is released meanwhile.
+static void thread_stop(Thread *thread)
+{
+    const struct timespec time = {.tv_nsec = (long)(draw() % STOP_MS + 1) * 1000000L};
+    thread->state = THREAD_OUTSIDE;
+    if (running == thread)
+        turn_give(thread_first_ready());
+    next.mutex_unlock(&lock);
+    clock_nanosleep(CLOCK_MONOTONIC, 0, &time, NULL);
+    next.mutex_lock(&lock);
+    turn_wait(thread);
+}
+
 // A call at which another thread may be chosen. errno stays.
 static void point(void)
 {
@@ -185,6 +226,8 @@ static void point(void)
         atomic_fetch_add(&control->points, 1);
         if (draw() % rate == 0)
             thread->priority = draw();
+        if (draw() % stop_rate == 0)
+            thread_stop(thread);
         Thread *first = thread_first_ready();
         if (running == thread && first != NULL && first->priority > thread->priority)
             turn_give(first);
@@ -226,7 +269,8 @@ static void enter(void)
 int pthread_mutex_lock(pthread_mutex_t *mutex)
 {
     next_find_all();
-    point();
+    if (is_own(__builtin_return_address(0)))
+        point();
     int code = next.mutex_trylock(mutex);
     if (code != EBUSY)
         return code;
@@ -240,7 +284,8 @@ int pthread_mutex_unlock(pthread_mutex_t *mutex)
 {
     next_find_all();
     const int code = next.mutex_unlock(mutex);
-    point();
+    if (is_own(__builtin_return_address(0)))
+        point();
     return code;
 }
 

@@ -85,6 +85,8 @@ class Campaign:
             with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
                 with contextlib.suppress(Ended):
                     done = self.folder(folder, done, schedules)
+            if done % 1000 == 0:
+                print(f"{done} schedules, {len(self.wrong)} faults", flush=True)
         self.outcomes["schedules"] = done
 
     def folder(self, folder, done, schedules):
