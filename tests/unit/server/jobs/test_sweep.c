@@ -120,7 +120,7 @@ static void *read_tables(void *context) {
 
 // One that is deleted between two queries of a reader was no damage.
 TEST(a_table_that_is_deleted_while_it_is_read_is_busy_or_gone) {
-    enum { POINTS = 4, TIMES = 60, READERS = 2 };
+    enum { POINTS = 4, TIMES = 40, READERS = 2 };
     Room room = room_make(2);
     pthread_t threads[READERS];
     char id[40];
