@@ -76,7 +76,7 @@ class Campaign:
     def fault(self, kind, text):
         self.outcomes[kind] += 1
         self.wrong.append(text)
-        print(f"  {kind}: {text}"[:1500], flush=True)
+        print(f"  {kind}: {text}"[:5000], flush=True)
 
     def run(self, schedules):
         """Runs schedules until there were as many, or ten are wrong."""
@@ -184,7 +184,8 @@ class Campaign:
             return
         errors = daemon.stderr()
         if code != (0 if is_soft else -signal.SIGKILL) or "ERROR: " in errors or "WARNING: ThreadSanitizer" in errors:
-            self.fault("crashed", f"ended with {code}: {errors[-3000:]}")
+            at = max(errors.find("WARNING: ThreadSanitizer"), 0)
+            self.fault("crashed", f"ended with {code}: {errors[at:at + 5000]}")
         self.outcomes["ended" if is_soft else "killed"] += 1
 
     def settle(self, actor, job):
