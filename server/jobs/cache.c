@@ -232,6 +232,7 @@ static Status series_compute(JobManager *manager, const char *result, const Call
     task->recompute_only = true;
     Status status = series_prepare(manager, task, problem);
     if (status == STATUS_OK) {
+        task_estimate(task);
         pthread_mutex_lock(&manager->lock);
         Task *other = hashmap_find(manager->tasks, result);
         const bool is_asked =

@@ -184,6 +184,8 @@ struct JobManager {
 // Without the lock:
 
 Task *task_new(JobManager *manager, const char *result);
+// Estimates what its inquiry will take, which may take seconds, before it is put into the queue.
+void task_estimate(Task *task);
 void task_free(Task *task); // the caller has freed task->study before
 void run_result_clear(RunResult *run_result);
 Job *job_new(JobManager *manager); // one reference; NULL without memory

@@ -277,6 +277,7 @@ static Task *submit_make_task(JobManager *manager, const JobRow *row, StudyReque
     task->warnings = strdup(row->warnings);
     task->inquiry = *request;
     *request = (StudyRequest){0};
+    task_estimate(task);
     if (task->scene != NULL && task->warnings != NULL)
         return task;
     task_free(task);

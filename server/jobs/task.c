@@ -304,9 +304,9 @@ bool task_is_shared(const Task *task) {
     return study != NULL && !task->recompute_only && study_has_members(study);
 }
 
-// What it will take, and what of that its client is charged for when it begins: the members of a
-// study have turns of their own.
-static void task_estimate(Task *task) {
+// Its client is charged for the scene's own run when that begins: the members of a study have turns
+// of their own.
+void task_estimate(Task *task) {
     const StudyRequest *inquiry = &task->inquiry;
     const Cost own = simulation_cost(&inquiry->simulation);
     Cost whole = own;
@@ -381,7 +381,6 @@ void jobs_call_worker(JobManager *manager) {
 void task_enqueue(Task *task, QueueClient *client) {
     JobManager *manager = task->manager;
     hashmap_add(manager->tasks, &task->indexed);
-    task_estimate(task);
     request_drop_records(&task->inquiry); // until it begins
     if (client == NULL)
         queue_push_front(manager->queue, &task->queued);
