@@ -11,13 +11,8 @@
 #   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
 #   faults      every allocation and file call of the canonical requests and of commands fails in turn
 #   truth       the long campaigns of tests/truth
-<<<<<<< HEAD
-#   storm       a million requests with killed clients and restarts, 10,000 cancels
-#   fuzz        mutated ground motions and material files
-=======
-#   storm       a million requests, 10,000 cancels
+#   storm       a million requests with killed clients and restarts, 10,000 cancels, 2,000 expensive bodies
 #   fuzz        libFuzzer: an hour of inputs for everything that is parsed, and what the kept inputs reach
->>>>>>> feb9935e (tests: libFuzzer targets for all that is parsed, with kept inputs that every run replays)
 #   browser     the browser tests with slow computers and late answers
 #   coverage    the lines and branches of server/ and core/ that unit and contract tests reach
 #   package     the Debian package in an empty Debian 12: install, upgrade, remove, purge
@@ -185,6 +180,10 @@ part_storm() {
     sized '--requests 20000 --clients 4 --restarts 2' '--requests 1000000 --clients 8' "$python" tests/storm/mixed.py --build build
     # CPU that goes on after a cancel was answered, median and most, by solver, excitation and study. 300 s
     sized 2 20 "$python" tests/storm/cancel_cpu.py --build build
+    # CPU and memory of expensive bodies against what was predicted and what is allowed. 1500 s
+    sized 20 2000 "$python" tests/storm/cost.py --build build
+    # How long reads take while two clients send such bodies.
+    sized 5 60 "$python" tests/storm/reads.py --build build
 }
 
 part_fuzz() {

@@ -14,7 +14,7 @@ static const double VALUE = 0.5, VALUE_MODE = 0.04;
 // CPU time of a step that the solvers count, over SOLVER_STEP: exact, exact with a power law, and
 // solvers that step. Measured by tests/bench/bench_cost.c.
 static const double EXACT_STEP = 0.65, POWER_STEP = 0.75, STEPPED_STEP = 1.15;
-static const double MODES = 2; // storeys cubed
+static const double MODES = 2, FRAME = 100; // storeys cubed, storeys
 
 // A random base: a value of the fade, a bin, a sample in memory that is new to the process, and a
 // value of the transform of a block, which does not fit in the caches above FAST_COARSE.
@@ -27,8 +27,14 @@ static const double RUN_BYTES = 1e5;
 static const double FRAME_ARCS = 14, BLOW_ARCS = 5; // Taylor steps of a contact, of an impulse
 static const double NEIGHBOUR = 1.6; // a frame with dampers and its companion until they diverge
 static const double IMPACTS_A_CYCLE = 2;
-static const double REACHING = 0.3;   // share of fast flight that no bound keeps from the stops
+static const double REACHING = 0.6;   // share of fast flight that no bound keeps from the stops
 static const double FREE_CYCLES = 30; // after these free vibration does not reach the stops
+
+// Masses whose clearance is small beside the motion stay in contact: half of the time where it is
+// 1 / SMALL of the motion. Steps for a radian of their fastest motion, under linear and power laws.
+static const double SMALL = 500, HELD_ARCS = 1.2, HELD_POWER = 0.5;
+static const double POWER_STEPS = 12;    // of a contact under a power law
+static const double HELD_ADAPTIVE = 150; // steps of a radian by the adaptive solver
 
 // A contact under a power law: the share that does not depend on the tolerance, and the digits of
 // full accuracy.
@@ -116,6 +122,46 @@ static double cost_impacts(const Scene *scene, const StructureRates *rates) {
            (double)scene->dampers.count;
 }
 
+// About the largest displacement, if dampers did not change it.
+static double cost_motion(const Scene *scene, const StructureRates *rates) {
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    const double slowest = fmax(rates->slowest, 1 / scene->duration);
+    double motion = 0, amplitude = 1;
+    for (size_t i = 0; i < excitation->displacement.count; i++)
+        motion = fmax(motion, fabs(excitation->displacement.at[i]));
+    for (size_t i = 0; i < excitation->velocity.count; i++)
+        motion = fmax(motion, fabs(excitation->velocity.at[i]) / slowest);
+    if (kind->amplitude != 0)
+        amplitude = *(const double *)(const void *)((const char *)excitation + kind->amplitude);
+    return kind == &excitation_free ? motion : fmax(motion, fabs(amplitude) / (slowest * slowest));
+}
+
+// The fastest motion in contacts of a damper [rad/s]; 0: it is unknown.
+static double cost_contact_rate(const Damper *damper, Side side) {
+    const Buffer *buffer = damper_buffer(damper, side);
+    if (buffer->contact_time > 0)
+        return TURN / 2 / buffer->contact_time;
+    return buffer->stiffness > 0 ? sqrt(buffer->stiffness / damper->mass) : 0;
+}
+
+// Time in contact as a share of the run, of the mass that is in contact longest, and the radians of
+// its motion in a second.
+static double cost_held(const Scene *scene, const StructureRates *rates, double *radians) {
+    const double motion = cost_motion(scene, rates);
+    double longest = 0;
+    *radians = 0;
+    for (size_t i = 0; i < scene->dampers.count && motion > 0; i++) {
+        const Damper *damper = &scene->dampers.at[i];
+        const double ratio = SMALL * damper->clearance / motion;
+        const double share = 1 / (1 + ratio * ratio);
+        longest = fmax(longest, share);
+        for (Side side = SIDE_LEFT; side <= SIDE_RIGHT; side++)
+            *radians = fmax(*radians, share * cost_contact_rate(damper, side));
+    }
+    return longest;
+}
+
 // plan_is_single() without a plan.
 static bool cost_is_single(const Scene *scene) {
     const Structure *structure = scene_structure(scene);
@@ -151,12 +197,17 @@ static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
     if (structure_rates(structure, n, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // without memory: the run reports it
     const double samples = (double)scene_sample_count(scene);
-    const double arcs = cost_flight_arcs(scene, &rates) + cost_base_arcs(simulation);
+    double radians;
+    const double held = cost_held(scene, &rates, &radians);
+    const ContactForm form = simulation_law(simulation)->form;
+    double arcs = cost_flight_arcs(scene, &rates) + cost_base_arcs(simulation);
+    // One mass in contact has a closed form for each sample interval.
+    if (form == CONTACT_LINEAR)
+        arcs += cost_is_single(scene) ? held * samples : HELD_ARCS * radians * scene->duration;
     const double impacts = cost_impacts(scene, &rates);
     *is_fast = arcs > samples;
     if (cost_is_single(scene))
         return samples * (m > 0 ? SAMPLE_NEAR_STOPS : SAMPLE) + ARC * arcs + IMPACT * impacts;
-    const ContactForm form = simulation_law(simulation)->form;
     const double digits = -log10(exact_tolerance(simulation_settings(simulation)));
     const double arc = step_work_steps(STEP_WORK_ARC, n, m, is_coupled);
     const double event = step_work_steps(STEP_WORK_EVENT, n, m, is_coupled);
@@ -166,8 +217,11 @@ static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
                                      (EASY + (1 - EASY) * digits / DIGITS)
                            : form == CONTACT_IMPULSIVE ? BLOW_ARCS * arc
                                                        : FRAME_ARCS * arc;
+    const double steps =
+        form == CONTACT_POWER ? held * samples + HELD_POWER * radians * scene->duration : 0;
     return (m > 0 ? NEIGHBOUR : 1) *
-           (samples * flight + arcs * arc + impacts * (contact + 2 * event + 2 * arc));
+           (steps * step_work_steps(STEP_WORK_POWER, n, m, is_coupled) / POWER_STEPS +
+            samples * flight + arcs * arc + impacts * (contact + 2 * event + 2 * arc));
 }
 
 double cost_truncation(const Simulation *simulation) {
@@ -193,9 +247,17 @@ static double cost_own_steps(const Simulation *simulation) {
     if (plan_sketch(&simulation->scene, simulation_modes(simulation, storeys), &plan) != STATUS_OK)
         return 0; // the run reports why
     const Solver *solver = simulation_solver(simulation);
-    const double steps = solver->cost(solver, simulation_settings(simulation),
-                                      simulation_base_interval(simulation), plan);
+    double steps = solver->cost(solver, simulation_settings(simulation),
+                                simulation_base_interval(simulation), plan);
     plan_free(plan);
+    StructureRates rates;
+    if (solver == &solver_adaptive &&
+        structure_rates(scene_structure(&simulation->scene), SIZE_MAX, &rates) == STATUS_OK) {
+        // The others take steps of the same length in a contact.
+        double radians;
+        (void)cost_held(&simulation->scene, &rates, &radians);
+        steps += HELD_ADAPTIVE * radians * simulation->scene.duration;
+    }
     return steps;
 }
 
@@ -268,7 +330,8 @@ Cost cost_scene(const Simulation *simulation) {
     if (simulation_modes(simulation, structure_storeys(scene_structure(scene))) <
         structure_storeys(scene_structure(scene)))
         cost.steps = cost_truncation(simulation);
-    cost.steps += RUN + cost.output + cost.spectra + cost.base + MODES * modes * modes * modes +
+    cost.steps += RUN + cost.output + cost.spectra + cost.base + FRAME * modes +
+                  MODES * modes * modes * modes +
                   cost_step(simulation) * (simulation_solver(simulation)->cost != NULL
                                                ? cost_own_steps(simulation)
                                                : cost_exact_steps(simulation, &cost.is_fast));

@@ -11,8 +11,9 @@ CPU is the daemon's, from the request to the answer; memory is what its peak is 
 seconds of the machine on which they were calibrated: a run of known work before each body measures how slow this one is
 at the moment, and ratios are relative to that. Memory is compared where more than FLOOR is used.
 
-Printed are the share of bodies that took at most twice what was predicted, by kind, the largest CPU time over its limit,
-and the largest memory over its limit. The end is 1 if one took more than three times its limit and OVERSHOOT, or if one
+Printed are the share of bodies that took at most twice what was predicted, by kind, of those with a quarter of their limit
+(those that are stopped took at least what is stated), the largest CPU time over its limit, and the largest memory over its
+limit. The end is 1 if one took more than three times its limit and OVERSHOOT, or if one
 that is predicted to take more was not refused."""
 
 import argparse
@@ -93,7 +94,9 @@ def measure(meter, seed, number):
     found["body"], cost = best
     slowness = meter.slowness()
     job, cpu, size = meter.run(found["body"])
-    found.update(status=job["status"], detail=(job["problem"] or {}).get("detail", ""), cpu=cpu, bytes=size,
+    problem = job["problem"] or {"type": "", "detail": ""}
+    found.update(status=job["status"], detail=problem["detail"], cpu=cpu, bytes=size,
+                 is_whole=job["status"] == "successful" or problem["type"] == "/problems/limit",
                  predicted=cost["cpu_seconds"], predicted_bytes=cost["bytes"], slowness=slowness,
                  ratio=cpu / cost["cpu_seconds"] / slowness, memory_ratio=max(size - FLOOR, 0) / cost["bytes"],
                  of_limit=cpu / limit_of(body), bytes_of_limit=size / MEMORY)
@@ -144,7 +147,7 @@ def campaign(meter, arguments):
             if arguments.list:
                 print(told(every[-1]), json.dumps(every[-1].get("body")), flush=True)
     ran = [one for one in every if not one["is_refused"]]
-    quarter = [one for one in ran if one["share"] < 1 and one["status"] == "successful"]
+    quarter = [one for one in ran if one["share"] < 1 and one["is_whole"]]
     print(f"{'measured over predicted':24} {'bodies':>6} | CPU: in 2 [%], middle, most | memory: in 2 [%], middle, most")
     for kind in sorted({one["kind"] for one in quarter}):
         summary(kind, [one for one in quarter if one["kind"] == kind])
@@ -154,7 +157,8 @@ def campaign(meter, arguments):
     accepted = [one for one in every if one.get("wrongly_accepted")]
     for one in beyond + accepted:
         print(told(one))
-    print(f"{len(every)} bodies, {len(every) - len(ran)} refused at any length, {sum('wrongly_accepted' in one for one in every)} refused "
+    within = [100 * sum(one[name] <= 2 for one in quarter) / max(len(quarter), 1) for name in ("ratio", "memory_ratio")]
+    print(f"at most twice the prediction: CPU of {within[0]:.1f} %, memory of {within[1]:.1f} %; {len(every)} bodies, {len(every) - len(ran)} refused at any length, {sum('wrongly_accepted' in one for one in every)} refused "
           f"when longer, {len(accepted)} of these accepted; most CPU {limit:.2f} and memory {size:.2f} of the limit, "
           f"{len(beyond)} above 3; most CPU to predict {1e3 * max(one['asked'] for one in every):.0f} ms")
     return 0 if not beyond and not accepted else 1

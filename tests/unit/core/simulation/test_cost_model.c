@@ -26,8 +26,13 @@ static Cost cost_of(const char *members, double duration, double sample_rate) {
     return cost;
 }
 
+#define HELD                                                                                       \
+    "\"dampers\": [{\"mass\": 0.1107, \"clearance\": 0, \"buffer\": {\"restitution\": 0.5, "       \
+    "\"contact_time\": 0.0005}}]"
+
 TEST(work_counted_is_about_what_was_predicted) {
     static const char *const scenes[] = {
+        SDOF "," HELD "," RANDOM "," NO_PSD,
         SDOF "," DAMPER "," RANDOM "," NO_PSD,
         SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"rk4\"}",
         SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"precise\"}",
