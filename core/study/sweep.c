@@ -25,6 +25,7 @@ enum {
     COST_SAMPLES = 64,
     COST_SCENES = 2000, // limit on their work
     AFFORDED_MIN = 16,
+    TARGET_SCENES = 10000,
     VALUES_MAX = 1 << 21,
     RANGE_SAMPLES = 512,
 };
@@ -137,6 +138,9 @@ static size_t sweep_grid_affordable(const SweepGrid *grid, size_t scenes) {
     double cost = 1 + n / 4 + n * n / 64;
     if (excitation_kind(excitation) == &excitation_record)
         cost += 1e-3 * (double)((const ExcitationRecord *)(const void *)excitation)->samples.count;
+    // An accuracy target is compared with a run of all modes, of up to 40 ms.
+    if (simulation_has_target(grid->simulation) && n > 1)
+        cost += TARGET_SCENES;
     if (scenes == SIZE_MAX)
         return SIZE_MAX;
     const size_t max = (size_t)((double)scenes / cost);
