@@ -294,7 +294,11 @@ char *bytes_take(Bytes *bytes, size_t *size) {
     char *at = is_whole ? bytes->at : NULL;
     if (size != NULL)
         *size = is_whole ? bytes->count : 0;
-    if (is_whole)
+    if (is_whole) {
         *bytes = (Bytes){.most = bytes->most};
+    } else { // also where another text of the caller's failed
+        free(bytes->at);
+        *bytes = (Bytes){.most = bytes->most, .is_failed = true, .is_over = bytes->is_over};
+    }
     return at;
 }

@@ -61,6 +61,12 @@ TEST(the_limit_is_exact_and_failure_stays) {
     assert_string_equal(bytes.at, "again");
     assert_int_equal(bytes.most, 1000);
     bytes_clear(&bytes);
+    // A caller says that another text of it failed: what there is of this one is freed.
+    Bytes part = {0};
+    bytes_text(&part, "abc");
+    part.is_failed = true;
+    assert_null(bytes_take(&part, &size));
+    assert_null(part.at);
 }
 
 TEST(sizes_that_overflow_fail) {
