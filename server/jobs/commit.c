@@ -143,9 +143,11 @@ static void commit_end_job(Task *task, Job *job, Status status, const char *deta
     if (status != STATUS_OK && !job->is_durable) {
         job_refuse(job, status, detail); // it was not accepted: its client gets this error
     } else {
-        job->row = job->written;
-        job->row.is_unsaved = false;
-        job->row.next = NULL;
+        // What commit_collect set; the rest never changes, and is read without the lock.
+        job->row.state = job->written.state;
+        job->row.finished_unix_ms = job->written.finished_unix_ms;
+        job->row.run = job->written.run;
+        job->row.total = job->written.total;
         job->row.problem = run->problem != NULL ? strdup(run->problem) : NULL;
         job->is_durable = status == STATUS_OK;
         if (status == STATUS_OK) {

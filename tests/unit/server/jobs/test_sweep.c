@@ -93,6 +93,22 @@ TEST(a_sweep_waits_for_a_disk_whose_faults_pass) {
     }
 }
 
+// For the thread sanitizer.
+TEST(the_client_of_a_job_is_read_while_it_ends) {
+    Room room = room_make(2);
+    for (size_t i = 0; i < 20; i++) {
+        char text[1024], id[40];
+        Job *job;
+        room_sweep(text, sizeof text, 2 + i, 0.1);
+        room_submit(&room, text, "lab", id);
+        assert_int_equal(jobs_find(room.manager, id, &job, NULL), STATUS_OK);
+        while (!job_is_finished(job))
+            assert_string_equal(job_client(job), "lab");
+        job_unref(job);
+    }
+    room_end(&room);
+}
+
 typedef struct Reading {
     Db *db;
     char result[72];
