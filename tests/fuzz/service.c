@@ -166,14 +166,15 @@ static void service_fill_database(Service *service) {
     service_run(service, sweep, service->sweep_job, service->sweep);
 }
 
+// A job ends at three times of the CPU time it is allowed, which an instrumented build needs.
 static const JobManagerSettings job_settings = {.workers = 1,
                                                 .queue_most = 50,
                                                 .cache_bytes = 1 << 20,
                                                 .store_bytes = 1 << 20,
-                                                .study_seconds = 0.1,
+                                                .study_seconds = 10,
                                                 .limits = {.samples = 2000,
                                                            .impacts = 1000,
-                                                           .steps = 2e4,
+                                                           .steps = 1e8,
                                                            .bytes = 1e8,
                                                            .document_bytes = 1e6,
                                                            .points = 20}};
