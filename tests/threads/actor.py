@@ -221,8 +221,10 @@ class Actor:
     def verify(self):
         """When all is quiet, each scene of the schedule has its result, with the right bytes."""
         for body, result, path, expected in self.scenes:
-            status, text = self.ask({200}, "POST", "/v1/jobs", body, WAITS[0])
+            status, text = self.ask({200, 202} if self.campaign.has_faults else {200}, "POST", "/v1/jobs", body, WAITS[0])
             self.acknowledge(status, text, result)
+            if status != 200:  # it waits until its chunks are written again
+                continue
             status, text = self.ask({200}, "GET", path)
             assert text == expected, f"other bytes at last: {path}: {text[:300]} instead of {expected[:300]}"
 
