@@ -290,12 +290,6 @@ typedef struct EnsembleWork {
     SpectrumAccumulator history; // displacements over time, as if they were spectra
 } EnsembleWork;
 
-typedef struct EnsemblePart {
-    StudyPart part;
-    Spectrum history; // the displacement over time, which is its `frequency`
-    uint64_t again[INPUT_NUMBERS_MAX];
-} EnsemblePart;
-
 // Position of a member. Runs 0 and 1 of a base sample are rows of the table.
 typedef struct EnsemblePlace {
     size_t sample, run;
@@ -323,8 +317,12 @@ static Status ensemble_scene(const void *of, size_t member, Simulation *scene, S
         TRY(fields_copy(simulation_fields, &work->base, scene));
     } else {
         double values[INPUT_NUMBERS_MAX];
-        TRY(input_model_draw(&work->model, place.sample, place.mixed, values,
-                             ((EnsemblePart *)(void *)part)->again, problem));
+        uint64_t again[INPUT_NUMBERS_MAX] = {0};
+        const Status drawn =
+            input_model_draw(&work->model, place.sample, place.mixed, values, again, problem);
+        for (size_t i = 0; i < work->model.count; i++)
+            TRY(study_add_real((double)again[i], &part->drawn_again));
+        TRY(drawn);
         if (place.run < 2)
             TRY(study_copy_reals(values, work->model.count, &part->run.inputs));
         TRY(input_model_scene(&work->model, values, &work->base, work->work.limits, scene,
@@ -360,10 +358,11 @@ static void ensemble_free(void *of) {
 
 static Status ensemble_scene_of(const void *work, size_t member, const SimulationLimits *limits,
                                 Simulation *scene) {
-    EnsemblePart part = {.again = {0}};
+    StudyPart part = {.is_refused = false};
     (void)limits;
-    const Status status = ensemble_scene(work, member, scene, &part.part, NULL);
-    free(part.part.run.inputs.at);
+    const Status status = ensemble_scene(work, member, scene, &part, NULL);
+    free(part.run.inputs.at);
+    free(part.drawn_again.at);
     return status;
 }
 
@@ -381,9 +380,8 @@ static Status ensemble_cost(const void *request, const Simulation *simulation,
 
 // Keeps the displacement at equally spaced times.
 static Status ensemble_keep(const void *of, const Outcome *outcome, const StudyTools *tools,
-                            StudyPart *made, Problem *problem) {
+                            StudyPart *part, Problem *problem) {
     const Response *response = &outcome->response;
-    EnsemblePart *part = (EnsemblePart *)(void *)made;
     (void)of;
     (void)tools;
     if (response->series.count == 0 || response->count == 0)
@@ -400,10 +398,6 @@ static Status ensemble_keep(const void *of, const Outcome *outcome, const StudyT
         part->history.densities.at[0].values[i] = column->values[i * stride];
     }
     return STATUS_OK;
-}
-
-static void ensemble_clear(StudyPart *part) {
-    spectrum_clear(&((EnsemblePart *)(void *)part)->history);
 }
 
 static bool ensemble_has_target(const EnsembleWork *work) {
@@ -467,18 +461,17 @@ static size_t ensemble_kept(const EnsembleStudy *study, double densities) {
 }
 
 // Adds a row, after a run that may have failed.
-static Status ensemble_fold_row(EnsembleWork *work, uint64_t seed, StudyPart *made) {
+static Status ensemble_fold_row(EnsembleWork *work, uint64_t seed, StudyPart *part) {
     Ensemble *answer = work->answer;
-    EnsemblePart *part = (EnsemblePart *)(void *)made;
-    const bool has_failed = made->run.why != NULL;
-    for (size_t i = 0; i < work->model.count; i++)
-        answer->inputs.at[i].drawn_again += part->again[i];
-    TRY(run_table_add(&answer->table, &made->run, seed));
+    const bool has_failed = part->run.why != NULL;
+    for (size_t i = 0; i < part->drawn_again.count; i++)
+        answer->inputs.at[i].drawn_again += (uint64_t)part->drawn_again.at[i];
+    TRY(run_table_add(&answer->table, &part->run, seed));
     if (has_failed)
         return STATUS_OK;
     TRY(spectrum_accumulator_add(&work->history, &part->history,
                                  ensemble_kept(work->study, HISTORY_POINTS)));
-    return spectrum_accumulator_add(&work->sums, &made->spectrum, work->kept);
+    return spectrum_accumulator_add(&work->sums, &part->spectrum, work->kept);
 }
 
 static Status ensemble_fold(void *of, size_t member, StudyPart *part) {
@@ -603,7 +596,7 @@ static Status ensemble_begin(void *of, const StudyTools *tools, Problem *problem
     if (ensemble_has_target(work) && study->runs > STOPPING_RULE_PILOT)
         work->work.wanted = STOPPING_RULE_PILOT;
     const size_t history = work->base.output.channels.count > 0 ? 2 * HISTORY_POINTS : 0;
-    work->work.part_bytes = sizeof(EnsemblePart) + sizeof(double) * ((size_t)densities + history);
+    work->work.part_bytes = sizeof(StudyPart) + sizeof(double) * ((size_t)densities + history);
     answer->first_seed = study->first_seed;
     answer->confidence = STATISTICS_CONFIDENCE;
     return STATUS_OK;
@@ -620,12 +613,11 @@ const StudyKind study_ensemble = {
     .complete = ensemble_complete,
     .cost = ensemble_cost,
     .work_size = sizeof(EnsembleWork),
-    .part_size = sizeof(EnsemblePart),
+    .part_size = sizeof(StudyPart),
     .begin = ensemble_begin,
     .scene = ensemble_scene,
     .keep = ensemble_keep,
     .fold = ensemble_fold,
     .end = ensemble_end,
-    .clear = ensemble_clear,
     .free = ensemble_free,
 };

@@ -232,7 +232,9 @@ void study_part_free(const StudyWork *work, StudyPart *part) {
     free(part->run.restitution.at);
     free(part->run.contact_time.at);
     free(part->run.inputs.at);
+    free(part->drawn_again.at);
     spectrum_clear(&part->spectrum);
+    spectrum_clear(&part->history);
     free(part);
 }
 

@@ -157,6 +157,8 @@ typedef struct StudyPart {
     RunRecord run;
     bool is_refused; // it failed before its run
     Spectrum spectrum;
+    Spectrum history;  // a channel over time, which is its `frequency`
+    Reals drawn_again; // how often each number of the inputs was
 } StudyPart;
 
 #define STUDY_BEGUN 0.1 // progress of the study when its first member is made
