@@ -44,6 +44,14 @@ void job_json_put(Bytes *bytes, const JobView *show, int parts) {
         bytes_json(bytes, ", \"points\": {\"all\": %llu, \"done\": %llu, \"failed\": %llu}",
                    (unsigned long long)show->points, (unsigned long long)show->points_done,
                    (unsigned long long)show->points_failed);
+    if (show->cluster.chunks > 0)
+        bytes_json(bytes,
+                   ", \"cluster\": {\"chunks\": %llu, \"done\": %llu, \"running\": %llu, "
+                   "\"queued\": %llu, \"reason\": %s}",
+                   (unsigned long long)show->cluster.chunks, (unsigned long long)show->cluster.done,
+                   (unsigned long long)show->cluster.running,
+                   (unsigned long long)show->cluster.queued,
+                   show->cluster.reason[0] != '\0' ? show->cluster.reason : NULL);
     bytes_json(bytes, ", \"cached\": %p, \"result\": %s", json_flag(row->is_cached),
                has_result ? row->result : NULL);
     if (has_result && !row->has_result)

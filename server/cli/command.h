@@ -43,7 +43,7 @@ extern const Command command_serve, command_run, command_check, command_tradeoff
     command_study, command_sweep, command_optimize, command_calibrate, command_response,
     command_fragility, command_import, command_materials, command_records, command_token,
     command_backup, command_restore, command_check_db, command_submit, command_watch, command_get,
-    command_cancel, command_compare, command_jobs, command_open;
+    command_cancel, command_compare, command_jobs, command_open, command_chunk;
 
 extern const Command *const commands[];        // NULL-terminated
 extern const OptionGroup command_groups[];     // headings, each above the command `first`

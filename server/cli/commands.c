@@ -228,7 +228,11 @@ const Command *command_find(const char *name) {
     for (size_t i = 0; commands[i] != NULL; i++)
         if (strcmp(commands[i]->name, name) == 0)
             return commands[i];
-    return strcmp(name, command_complete.name) == 0 ? &command_complete : NULL;
+    static const Command *const unlisted[] = {&command_complete, &command_chunk};
+    for (size_t i = 0; i < COUNT(unlisted); i++)
+        if (strcmp(unlisted[i]->name, name) == 0)
+            return unlisted[i];
+    return NULL;
 }
 
 static void overview_print(FILE *file) {

@@ -27,6 +27,10 @@ typedef struct ServeSettings {
         max_points, cache_bytes, store_bytes;
     uint64_t quota, keep_jobs, keep_bytes;
     double max_cpu_seconds, max_study_seconds, rate, keep_days;
+    int executor;
+    char *shared, *partition;
+    Texts sbatch_option;
+    double cluster_seconds, cluster_poll;
     int journal;
     bool require_tokens, print_config;
 } ServeSettings;
@@ -35,6 +39,9 @@ typedef struct ServeSettings {
 enum { GRACE_MS = 1500, BACKGROUND_TASKS = 2, RESPONSE_SHARE = 4 };
 
 #define MIB ((double)(1 << 20))
+
+typedef enum Executor { EXECUTOR_THREADS, EXECUTOR_SLURM } Executor;
+static const char *const executor_names[] = {"threads", "slurm", NULL};
 
 // clang-format off
 static const Field serve_fields[] = {
@@ -57,6 +64,12 @@ static const Field serve_fields[] = {
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "delete jobs that finished longer ago; a result is deleted with its last job; 0: never"),
     FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "number of finished jobs to keep, the oldest are deleted first; 0: all"),
     FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs are deleted; 0: no limit"),
+    FIELD_CHOICE(ServeSettings, executor, executor_names, EXECUTOR_THREADS, "what makes the members of long sweeps, ensembles and fragility studies: threads of this server, or slurm"),
+    FIELD_TEXT(ServeSettings, shared, 2000, PRESENCE_OPTIONAL, 0, "folder that this machine and all nodes see under the same path, for chunks of studies"),
+    FIELD_TEXT(ServeSettings, partition, 100, PRESENCE_OPTIONAL, 0, "Slurm's partition (its default)"),
+    FIELD_TEXTS(ServeSettings, sbatch_option, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "further option of sbatch, as --sbatch-option=--account=lab; repeatable"),
+    FIELD_REAL(ServeSettings, cluster_seconds, "s", WITHIN(0, 1e12), 60, "studies that are predicted to need less CPU time are made by this server's threads"),
+    FIELD_REAL(ServeSettings, cluster_poll, "s", WITHIN(0.05, 3600), 5, "shortest time between two questions to Slurm"),
     FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "additional accepted Host name; repeatable, or a list separated by commas"),
     FIELD_TEXTS(ServeSettings, allow_origin, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "another site whose pages may use the API, as https://lab.example.org; may be repeated, or a list with commas"),
     FIELD_TEXT(ServeSettings, base_url, 255, PRESENCE_OPTIONAL, 0, "URL for clients behind a proxy, as https://sim.example.org/impactd; links begin with it"),
@@ -71,13 +84,10 @@ static const Field serve_fields[] = {
 // clang-format on
 
 static const OptionGroup serve_groups[] = {
-    {"listen", "Address and data"},
-    {"workers", "Jobs"},
-    {"max_body", "Limits"},
-    {"cache_bytes", "Cache and retention"},
-    {"host", "Network and access"},
-    {"journal", "Log and settings"},
-    {NULL, NULL},
+    {"listen", "Address and data"},  {"workers", "Jobs"},
+    {"max_body", "Limits"},          {"cache_bytes", "Cache and retention"},
+    {"executor", "Cluster"},         {"host", "Network and access"},
+    {"journal", "Log and settings"}, {NULL, NULL},
 };
 
 // Defaults that depend on the machine.
@@ -113,6 +123,11 @@ static Status serve_check(const ServeSettings *settings, Problem *problem) {
         status =
             problem_add(problem, STATUS_USAGE, "--quota", "must be at most --queue, %llu, is %llu",
                         (unsigned long long)settings->queue, (unsigned long long)settings->quota);
+    if (settings->executor == EXECUTOR_SLURM &&
+        (settings->shared == NULL || settings->shared[0] != '/'))
+        status = problem_add(problem, STATUS_USAGE, "--shared",
+                             "must be the absolute path of a folder that this machine and all "
+                             "nodes see, for --executor slurm");
     if (settings->keep_bytes > 0 && settings->keep_bytes < 1 << 20)
         status = problem_add(problem, STATUS_USAGE, "--keep-bytes",
                              "must be at least %.0f B, the size of an empty database, or 0 for no "
@@ -341,7 +356,12 @@ static Status serve_open_jobs(App *app, const ServeSettings *settings, Problem *
                    .document_bytes = DOCUMENT_BYTES,
                    .points = settings->max_points},
         .has_maintenance = true,
-        .keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes}};
+        .keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes},
+        .cluster = {.shared = settings->executor == EXECUTOR_SLURM ? settings->shared : NULL,
+                    .partition = settings->partition,
+                    .options = settings->sbatch_option,
+                    .seconds = settings->cluster_seconds,
+                    .poll_seconds = settings->cluster_poll}};
     return jobs_open(app->db, &job_settings, &app->manager, problem);
 }
 

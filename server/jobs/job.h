@@ -33,6 +33,12 @@ typedef struct Callback {
     void (*wake)(void *context);
 } Callback;
 
+// Chunks of a study that a cluster makes.
+typedef struct ClusterView {
+    uint64_t chunks, done, queued, running; // chunks 0: no cluster makes it
+    char reason[240];                       // why nothing runs; "": something does
+} ClusterView;
+
 // A copy of the present state of a job. It owns the row's texts (job_view_clear).
 typedef struct JobView {
     JobRow row;                        // without what only the database and the queue need
@@ -41,6 +47,7 @@ typedef struct JobView {
     const char *notes;                 // JSON array, of the run; NULL: none
     struct ResultSummary *head;        // owns these four; NULL: the caller does
     uint64_t points, points_done, points_failed; // of a sweep that is under way; 0: none is
+    ClusterView cluster;
 } JobView;
 
 Job *job_ref(Job *job);

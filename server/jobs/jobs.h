@@ -12,6 +12,16 @@ enum {
     DOCUMENT_BYTES = 900000000
 }; // of one document or outcome; a value of SQLite has at most a billion
 
+// Where studies of at least `seconds` of predicted CPU time are made: by Slurm, with the files of
+// `shared`.
+typedef struct ClusterSettings {
+    const char *shared;    // folder that all machines see; NULL: no cluster
+    const char *partition; // NULL: Slurm's default
+    Texts options;         // further ones for sbatch; borrowed
+    double seconds;
+    double poll_seconds; // between questions to Slurm, at least
+} ClusterSettings;
+
 typedef struct JobManagerSettings {
     size_t workers;       // threads, at least 1
     size_t queue_most;    // unfinished jobs at most
@@ -28,6 +38,7 @@ typedef struct JobManagerSettings {
     // A thread deletes what exceeds `keep`, and retries writes that failed for want of space.
     bool has_maintenance;
     KeepRules keep;
+    ClusterSettings cluster;
 } JobManagerSettings;
 
 // Reads a scene's JSON, perhaps with a study, resolves its names, validates and completes it, all

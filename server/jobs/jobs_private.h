@@ -143,6 +143,7 @@ typedef struct Worker {
 
 struct JobManager {
     Db *db;
+    struct Cluster *cluster; // NULL: all is made here
     JobManagerSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;       // for a worker, or space for its result
@@ -282,6 +283,11 @@ Outcome *outcome_blob_read(const void *blob, size_t size);
 void series_blob_write(Bytes *bytes, const Columns *series);
 // `series` is cleared by columns_clear; false, and empty, as above.
 bool series_blob_read(const void *blob, size_t size, Columns *series);
+
+// A part of a study; of what its kind adds to it there is nothing.
+void part_blob_write(Bytes *bytes, const StudyPart *part);
+// Freed by study_part_free. NULL as above.
+StudyPart *part_blob_read(const StudyWork *work, const void *blob, size_t size);
 
 // cache.c. With the lock held. Takes references of its own; NULL for `outcome` or `summary` keeps
 // what is cached of it. The newest result is kept even if it is larger than the budget. Without

@@ -5,6 +5,7 @@
 //     outcome   head | energy | summary | impacts | spectrum, where there is one: head |
 //               frequencies | densities
 //     columns   count | rows | names and units | values, column after column
+//     part      status | flags | steps | why | summary | reduction | lists of numbers | spectra
 //
 // One function for each part writes and reads it.
 #include <stdlib.h>
@@ -212,4 +213,74 @@ bool series_blob_read(const void *blob, size_t size, Columns *series) {
         return true;
     columns_clear(series);
     return false;
+}
+
+// NULL and an empty text are the same here.
+static void blob_pass_text(Blob *blob, char **text) {
+    uint64_t size = *text != NULL ? strlen(*text) : 0;
+    blob_pass(blob, &size, sizeof size);
+    if (blob->bytes == NULL && size > 0) {
+        blob->is_broken = !blob_allows(blob, 1, size) || (*text = calloc(1, size + 1)) == NULL;
+        if (blob->is_broken)
+            return;
+    }
+    blob_pass(blob, *text, size);
+}
+
+static void blob_pass_reals(Blob *blob, Reals *reals) {
+    uint64_t count = reals->count;
+    blob_pass(blob, &count, sizeof count);
+    if (blob->bytes == NULL && count > 0 &&
+        (!blob_allows(blob, count, sizeof *reals->at) || !reals_allocate(reals, count))) {
+        blob->is_broken = true;
+        return;
+    }
+    blob_pass(blob, reals->at, count * sizeof *reals->at);
+}
+
+static void blob_pass_part(Blob *blob, StudyPart *part) {
+    enum { IS_REFUSED = 1, HAS_SPECTRUM = 2, HAS_HISTORY = 4 };
+    RunRecord *run = &part->run;
+    const bool is_read = blob->bytes == NULL;
+    uint64_t head[3] = {run->number, (uint64_t)run->status,
+                        (part->is_refused ? IS_REFUSED : 0) |
+                            (part->spectrum.densities.count > 0 ? HAS_SPECTRUM : 0) |
+                            (part->history.densities.count > 0 ? HAS_HISTORY : 0)};
+    blob_pass(blob, head, sizeof head);
+    blob->is_broken = blob->is_broken || head[1] >= STATUS_COUNT;
+    if (is_read && !blob->is_broken) {
+        run->number = head[0];
+        run->status = (Status)head[1];
+        part->is_refused = (head[2] & IS_REFUSED) != 0;
+    }
+    blob_pass(blob, &run->steps, sizeof run->steps);
+    blob_pass_text(blob, &run->why);
+    blob_pass_row(blob, summary_fields, &run->summary);
+    blob_pass_row(blob, reduction_fields, &run->reduction);
+    Reals *const lists[] = {&run->restitution, &run->contact_time, &run->inputs,
+                            &part->drawn_again};
+    for (size_t i = 0; i < COUNT(lists); i++)
+        blob_pass_reals(blob, lists[i]);
+    if ((head[2] & HAS_SPECTRUM) != 0)
+        blob_pass_spectrum(blob, &part->spectrum);
+    if ((head[2] & HAS_HISTORY) != 0)
+        blob_pass_spectrum(blob, &part->history);
+    // The sentence tells a run that failed.
+    blob->is_broken = blob->is_broken || (run->why == NULL) != (run->status == STATUS_OK);
+}
+
+void part_blob_write(Bytes *bytes, const StudyPart *part) {
+    blob_pass_part(&(Blob){.bytes = bytes}, (StudyPart *)part);
+}
+
+StudyPart *part_blob_read(const StudyWork *work, const void *blob, size_t size) {
+    Blob reader = {.at = blob, .left = size};
+    StudyPart *part = calloc(1, work->kind->part_size);
+    if (part == NULL)
+        return NULL;
+    blob_pass_part(&reader, part);
+    if (!reader.is_broken && reader.left == 0)
+        return part;
+    study_part_free(work, part);
+    return NULL;
 }

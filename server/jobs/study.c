@@ -15,6 +15,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "server/jobs/cluster.h"
 #include "server/util/clock.h"
 #include "server/util/process.h"
 
@@ -31,8 +32,9 @@ enum {
     REASONS = 1000,      // kept of the failed rows of a chunk
     REASON_BYTES = 160,
 };
-// Short chunks let rows appear soon, and little is lost when the daemon is killed.
-static const double chunk_seconds = 0.25;
+// Short chunks let rows appear soon, and little is lost when the daemon is killed. On a cluster
+// each has costs of its own.
+static const double chunk_seconds = 0.25, cluster_chunk_seconds = 60;
 
 static Status study_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
@@ -123,6 +125,11 @@ static bool study_engine_advance(void *context, double fraction) {
     return study_engine_continues(member->engine);
 }
 
+void study_engine_count(StudyEngine *engine, size_t members) {
+    atomic_fetch_add(&engine->millionths, (uint_fast64_t)members * MILLION);
+    (void)study_engine_continues(engine);
+}
+
 // Makes a member. The part is freed by study_part_free in any case.
 static Status study_engine_part(StudyEngine *engine, size_t member, Workspace *workspace,
                                 StudyPart **part, Problem *problem) {
@@ -195,9 +202,9 @@ static bool study_is_over(StudyRun *run) {
     return atomic_load(&run->engine.is_over) || atomic_load(&run->task->is_stopped);
 }
 
-static size_t sweep_count_chunks(size_t points, size_t slots, double seconds) {
+static size_t sweep_count_chunks(size_t points, size_t slots, double seconds, double each) {
     const double all = (double)points;
-    double chunks = fmin(ceil(seconds / chunk_seconds), CHUNKS_MAX);
+    double chunks = fmin(ceil(seconds / each), CHUNKS_MAX);
     chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
     chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * slots));
     return (size_t)fmin(chunks, all);
@@ -221,7 +228,8 @@ static Status sweep_begin(StudyRun *run, size_t slots, Problem *problem) {
             return study_no_memory(problem);
         row->metrics = metrics;
         row->points = points;
-        row->chunks = sweep_count_chunks((size_t)points, slots, run->task->queued.seconds);
+        row->chunks = sweep_count_chunks((size_t)points, slots, run->task->queued.seconds,
+                                         run->is_clustered ? cluster_chunk_seconds : chunk_seconds);
         row->created_unix_ms = clock_unix_ms();
     }
     // Also a row that is there: it may be about to be deleted with the last job before this one.
@@ -240,7 +248,10 @@ static Status sweep_list(StudyRun *run, const SweepChunkRows *saved, Problem *pr
             next > 0 && saved->at[next - 1].chunk == i ? &saved->at[--next] : NULL;
         const size_t count = sweep_rows_of(&run->sweep, i);
         if (row != NULL) {
-            const size_t made = row->is_open ? count - (size_t)row->failed : count;
+            // A cluster makes all rows of an open chunk again.
+            const size_t made = !row->is_open       ? count
+                                : run->is_clustered ? 0
+                                                    : count - (size_t)row->failed;
             run->rows_made += made;
             run->rows_failed += row->is_open ? 0 : (size_t)row->failed;
             atomic_fetch_add(&run->engine.millionths, (uint_fast64_t)made * MILLION);
@@ -273,7 +284,9 @@ static Status sweep_open(StudyRun *run, size_t slots, Problem *problem) {
     return status;
 }
 
-static void sweep_chunk_free(SweepChunk *chunk) {
+void sweep_chunk_free(SweepChunk *chunk) {
+    if (chunk == NULL)
+        return;
     sweep_chunk_row_clear(&chunk->row);
     bytes_clear(&chunk->reasons);
     free(chunk);
@@ -316,9 +329,32 @@ static void sweep_chunk_add_reason(SweepChunk *chunk, const char *why) {
     bytes_format(&chunk->reasons, "%zu %s\n", chunk->done, line);
 }
 
+// The row of a member that is made.
+static void sweep_chunk_put_row(StudyRun *run, SweepChunk *chunk, const StudyPart *part) {
+    double values[SWEEP_METRICS];
+    sweep_values(&((const SweepStudy *)run->work->study)->metrics, &part->run, values);
+    sweep_row_put(&run->sweep, &chunk->row, chunk->done, sweep_status(part->run.status), values);
+    if (part->run.why != NULL)
+        sweep_chunk_add_reason(chunk, part->run.why);
+}
+
+Status sweep_chunk_restart(StudyRun *run, SweepChunk *chunk, Problem *problem) {
+    TRY(sweep_chunk_load(run, chunk, problem));
+    bytes_clear(&chunk->reasons);
+    free(chunk->row.reasons);
+    chunk->row.reasons = NULL;
+    chunk->row.failed = 0;
+    chunk->done = 0;
+    return STATUS_OK;
+}
+
+void sweep_chunk_put(StudyRun *run, SweepChunk *chunk, const StudyPart *part) {
+    sweep_chunk_put_row(run, chunk, part);
+    chunk->done++;
+}
+
 static Status sweep_chunk_make(StudyRun *run, SweepChunk *chunk, Workspace *workspace,
                                Problem *problem) {
-    const StudyWork *work = run->work;
     double values[SWEEP_METRICS];
     StudyPart *part = NULL;
     if (chunk->is_retry &&
@@ -327,20 +363,15 @@ static Status sweep_chunk_make(StudyRun *run, SweepChunk *chunk, Workspace *work
     const size_t point = (size_t)(chunk->row.chunk + chunk->done * run->sweep.chunks);
     const Status status = study_engine_part(&run->engine, point, workspace, &part, problem);
     if (status == STATUS_OK) {
-        sweep_values(&((const SweepStudy *)work->study)->metrics, &part->run, values);
-        sweep_row_put(&run->sweep, &chunk->row, chunk->done, sweep_status(part->run.status),
-                      values);
-        if (part->run.why != NULL) {
-            sweep_chunk_add_reason(chunk, part->run.why);
-            run->rows_failed++;
-        }
+        sweep_chunk_put_row(run, chunk, part);
+        run->rows_failed += part->run.why != NULL;
         run->rows_made++;
     }
-    study_part_free(work, part);
+    study_part_free(run->work, part);
     return status;
 }
 
-static Status sweep_chunk_save(StudyRun *run, SweepChunk *chunk, Problem *problem) {
+Status sweep_chunk_save(StudyRun *run, SweepChunk *chunk, Problem *problem) {
     if (chunk->reasons.count > 0 &&
         (chunk->row.reasons = bytes_take(&chunk->reasons, NULL)) == NULL)
         return study_no_memory(problem);
@@ -358,6 +389,7 @@ void study_run_free(StudyRun *run) {
         run->chunks = chunk->next;
         sweep_chunk_free(chunk);
     }
+    cluster_study_free(run->cluster);
     sweep_row_clear(&run->sweep);
     study_engine_close(&run->engine);
     study_free(run->work);
@@ -369,7 +401,7 @@ void study_run_free(StudyRun *run) {
 static void study_enqueue(StudyRun *run) {
     QueueEntry *entry = &run->task->queued;
     const bool has_work = run->is_sweep ? run->chunks != NULL : study_engine_has_next(&run->engine);
-    if (entry->number != 0 || !has_work || run->task->is_waiting)
+    if (entry->number != 0 || !has_work || run->task->is_waiting || run->is_clustered)
         return;
     entry->is_turn = true;
     entry->seconds = fmax(run->member_seconds, 1e-3 * TURN_MS);
@@ -411,12 +443,18 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
     const Progress members = {run->task, study_advance_task};
     const StudyTools tools = {
         .limits = &settings->limits, .progress = &begin, .workspace = &worker->workspace};
+    Cluster *cluster = worker->manager->cluster;
     run->is_sweep = study_kind(inquiry->study) == &study_sweep;
+    run->is_clustered =
+        cluster_wants(cluster, study_kind(inquiry->study), run->task->queued.seconds);
+    const size_t slots = run->is_clustered ? cluster_slots(cluster) : settings->workers;
     TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &answer->study, &run->work,
                     problem));
     TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
                           run->is_sweep ? 0 : settings->workers, problem));
-    return run->is_sweep ? sweep_open(run, settings->workers, problem) : STATUS_OK;
+    if (run->is_sweep)
+        TRY(sweep_open(run, slots, problem));
+    return run->is_clustered ? cluster_prepare(cluster, run, problem) : STATUS_OK;
 }
 
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
@@ -439,6 +477,8 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     task->study = run;
     run->next = manager->studies;
     manager->studies = run;
+    if (run->is_clustered)
+        cluster_take(run);
     study_enqueue(run);
     pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;
@@ -536,6 +576,12 @@ static void study_fail(StudyRun *run, Status status, Problem *problem) {
     run->is_failed = true;
     study_engine_stop(&run->engine);
     run_result_fail(&run->run_result, status, problem);
+}
+
+void study_run_fail(StudyRun *run, Status status, Problem *problem) {
+    pthread_mutex_lock(&run->manager->lock);
+    study_fail(run, status, problem);
+    pthread_mutex_unlock(&run->manager->lock);
 }
 
 // With the lock held.

@@ -38,6 +38,8 @@ bool study_engine_has_next(StudyEngine *engine);
 // Folds the part and all that wait behind it, or keeps it until those before it are there. Takes
 // the part.
 Status study_engine_fold(StudyEngine *engine, size_t member, StudyPart *part, Problem *problem);
+// So many more members were made; reports progress.
+void study_engine_count(StudyEngine *engine, size_t members);
 
 // A chunk that waits or is being made.
 typedef struct SweepChunk {
@@ -61,6 +63,8 @@ typedef struct StudyRun {
     RunResult run_result;
     // Of a sweep, whose parts are not folded: rows in the database, chunk by chunk.
     bool is_sweep;
+    bool is_clustered; // a cluster makes the members, not the workers
+    struct ClusterStudy *cluster;
     SweepRow sweep;
     atomic_size_t chunks_left;            // that are not saved
     atomic_size_t rows_made, rows_failed; // the failed ones are made too
@@ -87,6 +91,14 @@ void study_leave(Worker *worker, StudyRun *run, Problem *problem);
 // Makes members or ends the study. Both may be freed afterwards.
 void study_work(Worker *worker, const StudyTurn *turn, Problem *problem);
 void study_run_free(StudyRun *run); // NULL is fine
+// Ends the study as failed, once its turns are over.
+void study_run_fail(StudyRun *run, Status status, Problem *problem);
+
+// A chunk whose rows are made elsewhere: restart, put each of them, save.
+Status sweep_chunk_restart(StudyRun *run, SweepChunk *chunk, Problem *problem);
+void sweep_chunk_put(StudyRun *run, SweepChunk *chunk, const StudyPart *part);
+Status sweep_chunk_save(StudyRun *run, SweepChunk *chunk, Problem *problem);
+void sweep_chunk_free(SweepChunk *chunk); // NULL is fine
 
 // With the manager's lock held:
 // Begins the turn that was taken from the queue. False: there is nothing to do in it.

@@ -1,0 +1,251 @@
+// impactd chunk: makes one chunk of a study in a shared folder, as a task of a cluster's scheduler.
+// The members are made in a child process, so that one that crashes is a failed run and not a
+// failed chunk. The exit code is one of sysexits.h: 65 never succeeds, 74 and 75 may later.
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#include "server/cli/command.h"
+#include "server/jobs/chunk_file.h"
+#include "server/jobs/jobs_private.h"
+
+typedef struct ChunkSettings {
+    uint64_t first;
+} ChunkSettings;
+
+// clang-format off
+static const Field chunk_fields[] = {
+    FIELD_COUNT(ChunkSettings, first, NULL, WITHIN(0, 1e6), 0, "chunk of task 0"),
+    FIELD_END,
+};
+// clang-format on
+
+// A chunk on its way.
+typedef struct ChunkMaking {
+    const char *folder;
+    ChunkPlan plan;
+    ChunkKey key;
+    StudyRequest request;
+    Variant *answer;
+    StudyWork *work;
+    size_t chunk, count, made; // members
+    Bytes bytes;
+} ChunkMaking;
+
+static volatile sig_atomic_t chunk_child; // 0: none
+
+// The scheduler wants the processor back: another task makes the chunk anew.
+static void chunk_stop(int signal) {
+    (void)signal;
+    if (chunk_child > 0)
+        (void)kill((pid_t)chunk_child, SIGKILL);
+    _exit(EX_TEMPFAIL);
+}
+
+static bool pipe_write(int pipe, const void *data, size_t size) {
+    for (const char *at = data; size > 0;) {
+        const ssize_t count = write(pipe, at, size);
+        if (count < 0 && errno != EINTR)
+            return false;
+        at += count > 0 ? count : 0;
+        size -= count > 0 ? (size_t)count : 0;
+    }
+    return true;
+}
+
+static bool pipe_read(int pipe, void *data, size_t size) {
+    for (char *at = data; size > 0;) {
+        const ssize_t count = read(pipe, at, size);
+        if (count == 0 || (count < 0 && errno != EINTR))
+            return false;
+        at += count > 0 ? count : 0;
+        size -= count > 0 ? (size_t)count : 0;
+    }
+    return true;
+}
+
+// The child: makes the members from `made` on and writes them to the pipe. Returns its exit code.
+static int chunk_make_members(const ChunkMaking *making, int pipe) {
+    const SimulationLimits limits = chunk_plan_limits(&making->plan);
+    Workspace workspace = {0};
+    const StudyTools tools = {.limits = &limits, .workspace = &workspace};
+    Problem problem;
+    for (size_t i = making->made; i < making->count; i++) {
+        const size_t member = chunk_plan_member(&making->plan, making->chunk, i);
+        StudyPart *part = NULL;
+        Bytes bytes = {0};
+        problem_clear(&problem);
+        if (study_part_make(making->work, member, &tools, &part, &problem) != STATUS_OK) {
+            fprintf(stderr, "impactd chunk: %s\n", problem.detail);
+            return EX_TEMPFAIL;
+        }
+        part_blob_write(&bytes, part);
+        const uint64_t size = bytes.count;
+        if (bytes.is_failed || !pipe_write(pipe, &size, sizeof size) ||
+            !pipe_write(pipe, bytes.at, bytes.count))
+            return EX_TEMPFAIL;
+        bytes_clear(&bytes);
+        study_part_free(making->work, part);
+    }
+    return EX_OK;
+}
+
+// Takes what the child writes, member by member; of one that it did not write whole, nothing.
+static void chunk_take_members(ChunkMaking *making, int pipe) {
+    uint64_t size;
+    while (making->made < making->count && pipe_read(pipe, &size, sizeof size)) {
+        char *part = malloc((size_t)size + 1);
+        const bool is_whole = part != NULL && pipe_read(pipe, part, (size_t)size);
+        if (is_whole) {
+            chunk_add(&making->bytes, part, (size_t)size);
+            making->made++;
+        }
+        free(part);
+        if (!is_whole)
+            return;
+    }
+}
+
+// The run in which the program crashed.
+static void chunk_add_crash(ChunkMaking *making, int signal) {
+    char why[160];
+    StudyPart part = {.run = {.status = STATUS_INTERNAL, .why = why, .steps = (double)NAN}};
+    Bytes bytes = {0};
+    snprintf(why, sizeof why, "the program crashed in this run: %s", strsignal(signal));
+    fprintf(stderr, "impactd chunk: member %zu: %s\n",
+            chunk_plan_member(&making->plan, making->chunk, making->made), why);
+    (void)fields_default(summary_fields, &part.run.summary);
+    (void)fields_default(reduction_fields, &part.run.reduction);
+    part_blob_write(&bytes, &part);
+    chunk_add(&making->bytes, bytes.at, bytes.count);
+    bytes_clear(&bytes);
+    making->made++;
+}
+
+static bool signal_is_crash(int signal) {
+    return signal == SIGSEGV || signal == SIGBUS || signal == SIGFPE || signal == SIGILL ||
+           signal == SIGABRT;
+}
+
+// One child, to its end. Returns an exit code; EX_OK also after a crash, which is a member.
+static int chunk_run_child(ChunkMaking *making) {
+    int ends[2], state;
+    if (pipe(ends) != 0)
+        return EX_OSERR;
+    const pid_t child = fork();
+    if (child == 0) {
+        (void)signal(SIGTERM, SIG_DFL);
+        (void)close(ends[0]);
+        _exit(chunk_make_members(making, ends[1]));
+    }
+    chunk_child = (sig_atomic_t)child;
+    (void)close(ends[1]);
+    if (child > 0)
+        chunk_take_members(making, ends[0]);
+    (void)close(ends[0]);
+    while (child > 0 && waitpid(child, &state, 0) < 0 && errno == EINTR)
+        ;
+    chunk_child = 0;
+    if (child < 0 || making->bytes.is_failed)
+        return EX_TEMPFAIL;
+    if (WIFEXITED(state))
+        return WEXITSTATUS(state);
+    if (!signal_is_crash(WTERMSIG(state)))
+        return EX_TEMPFAIL;
+    if (making->made < making->count)
+        chunk_add_crash(making, WTERMSIG(state));
+    return EX_OK;
+}
+
+// The study begun as everywhere; exit code.
+static int chunk_open(ChunkMaking *making, Problem *problem) {
+    Status status =
+        chunk_folder_read(making->folder, &making->plan, &making->key, &making->request, problem);
+    if (status != STATUS_OK)
+        return status == STATUS_IO || status == STATUS_NO_MEMORY ? EX_TEMPFAIL : EX_DATAERR;
+    if (making->request.study == NULL || making->chunk >= making->plan.chunks) {
+        (void)problem_set(problem, STATUS_INVALID, "there is no chunk %zu", making->chunk);
+        return EX_DATAERR;
+    }
+    const SimulationLimits limits = chunk_plan_limits(&making->plan);
+    Workspace workspace = {0};
+    const StudyTools tools = {.limits = &limits, .workspace = &workspace};
+    status = study_begin(making->request.study, &making->request.simulation, &tools,
+                         &making->answer, &making->work, problem);
+    workspace_clear(&workspace);
+    if (status != STATUS_OK)
+        return status == STATUS_NO_MEMORY ? EX_TEMPFAIL : EX_DATAERR;
+    if (making->work->members != making->plan.members) {
+        (void)problem_set(problem, STATUS_INVALID, "the study has %zu members here, not %llu",
+                          making->work->members, (unsigned long long)making->plan.members);
+        return EX_DATAERR;
+    }
+    making->count = chunk_plan_count(&making->plan, making->chunk);
+    return EX_OK;
+}
+
+static int chunk_make(ChunkMaking *making, Problem *problem) {
+    ChunkFile made = {.at = 0};
+    int code = chunk_open(making, problem);
+    if (code != EX_OK)
+        return code;
+    const Status found =
+        chunk_read(making->folder, &making->plan, &making->key, making->chunk, &made, problem);
+    bytes_clear(&made.bytes);
+    if (found == STATUS_OK) // by another copy of this task
+        return EX_OK;
+    problem_clear(problem);
+    chunk_begin(&making->bytes, &making->key, making->chunk, making->count);
+    while (code == EX_OK && making->made < making->count)
+        code = chunk_run_child(making);
+    if (code != EX_OK) {
+        (void)problem_set(problem, STATUS_IO, "stopped after %zu of %zu runs", making->made,
+                          making->count);
+        return code;
+    }
+    const Status status = chunk_save(making->folder, making->chunk, &making->bytes, problem);
+    return status == STATUS_OK ? EX_OK : status == STATUS_FULL ? EX_IOERR : EX_TEMPFAIL;
+}
+
+static int chunk_run(const Command *self, void *item, const Options *options, Problem *problem) {
+    const ChunkSettings *settings = item;
+    ChunkMaking making = {.chunk = (size_t)settings->first};
+    char *end = NULL;
+    const unsigned long task =
+        options->operand_count == 2 ? strtoul(options->operands[1], &end, 10) : 0;
+    if (options->operand_count != 2 || end == options->operands[1] || *end != '\0') {
+        (void)problem_set(problem, STATUS_USAGE, "expects a folder and the number of a task");
+        return command_error(self->name, problem);
+    }
+    making.folder = options->operands[0];
+    making.chunk += task;
+    (void)signal(SIGTERM, chunk_stop);
+    (void)signal(SIGPIPE, SIG_IGN);
+    const int code = chunk_make(&making, problem);
+    if (code != EX_OK)
+        fprintf(stderr, "impactd chunk %zu: %s\n", making.chunk, problem->detail);
+    study_free(making.work);
+    variant_free(making.answer);
+    study_request_clear(&making.request);
+    chunk_plan_clear(&making.plan);
+    bytes_clear(&making.bytes);
+    return code;
+}
+
+const Command command_chunk = {
+    .name = "chunk",
+    .operands = "FOLDER TASK",
+    .summary = "make one chunk of a study in a folder that a cluster shares",
+    .help = "impactd serve --executor slurm submits this; there is no need to call it by hand.\n"
+            "\n"
+            "The exit code is 65 where the chunk can never be made (another version of impactd),\n"
+            "74 where the folder is full, 75 where another attempt may succeed.\n",
+    .options = chunk_fields,
+    .size = sizeof(ChunkSettings),
+    .run = chunk_run,
+};
