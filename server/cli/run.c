@@ -10,6 +10,7 @@
 #include "core/study/sweep.h"
 #include "core/study/tradeoff.h"
 #include "server/api/job_json.h"
+#include "server/cli/cluster_check.h"
 #include "server/cli/files.h"
 #include "server/cli/report.h"
 #include "server/formats/study_formats.h"
@@ -67,6 +68,9 @@ typedef struct RunSettings {
     Texts record, set, vary;
     int unit;
     double max_cpu_seconds;
+    int executor; // of check
+    char *shared, *partition;
+    Texts sbatch_option;
     const TableFormat *format; // of the output's extension; NULL without output, or for a page
 } RunSettings;
 
@@ -336,6 +340,7 @@ static const Field check_fields[] = {
     VARY_ROW(RunSettings),
     RECORD_ROWS(RunSettings),
     CPU_ROW(RunSettings),
+    CLUSTER_ROWS(RunSettings, "slurm: check the set-up of a cluster instead of a scene"),
     FIELD_END,
 };
 
@@ -385,6 +390,12 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
 }
 
 static int check(const Command *self, void *settings, const Options *options, Problem *problem) {
+    const RunSettings *asked = settings;
+    const ClusterSettings cluster = {.shared = asked->shared,
+                                     .partition = asked->partition,
+                                     .options = asked->sbatch_option};
+    if (asked->executor == EXECUTOR_SLURM)
+        return command_end(self, cluster_check(&cluster, problem), problem);
     return input_command(self, "scene", options, settings, plan_show, problem);
 }
 
@@ -396,11 +407,15 @@ const Command command_check = {
             "  impactd check scene.json --json          # the plan as JSON\n"
             "  impactd check scene.json --set contact.model=impulse\n"
             "  impactd check - < scene.json             # from standard input\n"
+            "  impactd check --executor slurm --shared /home/lab/impactd\n"
             "\n"
             "The plan has the choices of the program with their reasons, the stiffness and\n"
             "damping of each stop, and the estimated cost. Nothing is run. Where standard\n"
             "output is no terminal, the plan is printed as JSON. Exit code 3 if the scene has\n"
-            "faults.\n",
+            "faults.\n"
+            "\n"
+            "With --executor slurm it checks whether a cluster can make studies: the shared\n"
+            "folder, Slurm, and a small study on a node.\n",
     .options = check_fields,
     .size = sizeof(RunSettings),
     .run = check,

@@ -14,6 +14,7 @@
 #include "core/math/fft.h"
 #include "core/study/sweep.h"
 #include "server/api/app.h"
+#include "server/cli/cluster_check.h"
 #include "server/cli/files.h"
 #include "server/http/server.h"
 #include "server/options.h"
@@ -40,9 +41,6 @@ enum { GRACE_MS = 1500, BACKGROUND_TASKS = 2, RESPONSE_SHARE = 4 };
 
 #define MIB ((double)(1 << 20))
 
-typedef enum Executor { EXECUTOR_THREADS, EXECUTOR_SLURM } Executor;
-static const char *const executor_names[] = {"threads", "slurm", NULL};
-
 // clang-format off
 static const Field serve_fields[] = {
     FIELD_TEXT(ServeSettings, listen, 255, PRESENCE_OPTIONAL, 0, "HOST:PORT, a numeric address or localhost; port 0: any free port; other than loopback requires a token (127.0.0.1:8080)"),
@@ -64,10 +62,7 @@ static const Field serve_fields[] = {
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "delete jobs that finished longer ago; a result is deleted with its last job; 0: never"),
     FIELD_COUNT(ServeSettings, keep_jobs, NULL, WITHIN(0, 1e12), 0, "number of finished jobs to keep, the oldest are deleted first; 0: all"),
     FIELD_COUNT(ServeSettings, keep_bytes, "B", WITHIN(0, 1e18), 0, "size of the database beyond which the oldest finished jobs are deleted; 0: no limit"),
-    FIELD_CHOICE(ServeSettings, executor, executor_names, EXECUTOR_THREADS, "what makes the members of long sweeps, ensembles and fragility studies: threads of this server, or slurm"),
-    FIELD_TEXT(ServeSettings, shared, 2000, PRESENCE_OPTIONAL, 0, "folder that this machine and all nodes see under the same path, for chunks of studies"),
-    FIELD_TEXT(ServeSettings, partition, 100, PRESENCE_OPTIONAL, 0, "Slurm's partition (its default)"),
-    FIELD_TEXTS(ServeSettings, sbatch_option, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "further option of sbatch, as --sbatch-option=--account=lab; repeatable"),
+    CLUSTER_ROWS(ServeSettings, "what makes the members of long sweeps, ensembles and fragility studies: threads of this server, or slurm"),
     FIELD_REAL(ServeSettings, cluster_seconds, "s", WITHIN(0, 1e12), 60, "studies that are predicted to need less CPU time are made by this server's threads"),
     FIELD_REAL(ServeSettings, cluster_poll, "s", WITHIN(0.05, 3600), 5, "shortest time between two questions to Slurm"),
     FIELD_TEXTS(ServeSettings, host, NULL, NULL, 64, PRESENCE_OPTIONAL, 0, "additional accepted Host name; repeatable, or a list separated by commas"),
@@ -124,10 +119,8 @@ static Status serve_check(const ServeSettings *settings, Problem *problem) {
             problem_add(problem, STATUS_USAGE, "--quota", "must be at most --queue, %llu, is %llu",
                         (unsigned long long)settings->queue, (unsigned long long)settings->quota);
     if (settings->executor == EXECUTOR_SLURM &&
-        (settings->shared == NULL || settings->shared[0] != '/'))
-        status = problem_add(problem, STATUS_USAGE, "--shared",
-                             "must be the absolute path of a folder that this machine and all "
-                             "nodes see, for --executor slurm");
+        cluster_check_folder(settings->shared, problem) != STATUS_OK)
+        status = STATUS_USAGE;
     if (settings->keep_bytes > 0 && settings->keep_bytes < 1 << 20)
         status = problem_add(problem, STATUS_USAGE, "--keep-bytes",
                              "must be at least %.0f B, the size of an empty database, or 0 for no "

@@ -13,6 +13,7 @@
 #include "core/excitation/recorded_motion.h"
 #include "core/study/axis.h"
 #include "server/db/records.h"
+#include "server/jobs/documents.h"
 #include "server/jobs/jobs_private.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
@@ -47,6 +48,23 @@ static const Field plan_fields[] = {
 
 void chunk_plan_clear(ChunkPlan *plan) {
     fields_clear(plan_fields, plan);
+}
+
+Status chunk_plan_make(ChunkPlan *plan, const StudyRequest *request, const char *result,
+                       const SimulationLimits *limits, Problem *problem) {
+    Bytes scene = {0};
+    *plan = (ChunkPlan){.samples = limits->samples,
+                        .impacts = limits->impacts,
+                        .points = limits->points,
+                        .steps = limits->steps,
+                        .bytes = limits->bytes,
+                        .document_bytes = limits->document_bytes};
+    document_scene(&scene, request);
+    plan->scene = bytes_take(&scene, NULL);
+    const Status all[] = {status_made(plan->scene != NULL),
+                          text_copy(engine_version, &plan->engine),
+                          text_copy(result, &plan->result)};
+    return study_result(status_first(all, COUNT(all)), problem);
 }
 
 SimulationLimits chunk_plan_limits(const ChunkPlan *plan) {

@@ -25,6 +25,9 @@ typedef struct ChunkPlan {
     uint64_t samples, impacts, points; // limits of each run: SimulationLimits
     double steps, bytes, document_bytes;
 } ChunkPlan;
+// For a completed request, but for members and chunks. STATUS_NO_MEMORY.
+Status chunk_plan_make(ChunkPlan *plan, const StudyRequest *request, const char *result,
+                       const SimulationLimits *limits, Problem *problem);
 void chunk_plan_clear(ChunkPlan *plan);
 SimulationLimits chunk_plan_limits(const ChunkPlan *plan);
 size_t chunk_plan_count(const ChunkPlan *plan, size_t chunk); // members of it

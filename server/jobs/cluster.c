@@ -143,16 +143,11 @@ void cluster_study_free(ClusterStudy *study) {
 static Status study_plan(ClusterStudy *study, size_t slots, Problem *problem) {
     StudyRun *run = study->run;
     const Task *task = run->task;
-    const SimulationLimits *limits = &run->manager->settings.limits;
     ChunkPlan *plan = &study->plan;
-    *plan = (ChunkPlan){.members = run->work->members,
-                        .is_strided = run->is_sweep,
-                        .samples = limits->samples,
-                        .impacts = limits->impacts,
-                        .points = limits->points,
-                        .steps = limits->steps,
-                        .bytes = limits->bytes,
-                        .document_bytes = limits->document_bytes};
+    TRY(chunk_plan_make(plan, &task->inquiry, task->result, &run->manager->settings.limits,
+                        problem));
+    plan->members = run->work->members;
+    plan->is_strided = run->is_sweep;
     const double members = (double)plan->members;
     double chunks = fmax(ceil(task->queued.seconds / chunk_target), (double)(4 * slots));
     chunks = fmax(chunks, ceil(members * (double)run->work->part_bytes / CHUNK_BYTES));
@@ -161,10 +156,7 @@ static Status study_plan(ClusterStudy *study, size_t slots, Problem *problem) {
     plan->chunks = (uint64_t)ceil(members / ceil(members / chunks));
     if (run->is_sweep)
         plan->chunks = run->sweep.chunks;
-    const Status all[] = {text_copy(engine_version, &plan->engine),
-                          text_copy(task->result, &plan->result),
-                          text_copy(task->scene, &plan->scene)};
-    return study_result(status_first(all, COUNT(all)), problem);
+    return STATUS_OK;
 }
 
 Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem) {
