@@ -89,13 +89,22 @@ typedef struct JobProgress {
     ProgressBar bar;
     FILE *lines; // NULL: none
     char status[48];
+    char reason[80]; // why a cluster does not make it, as it was printed last
     double progress;
 } JobProgress;
+
+static void job_reason_show(JobProgress *show, const char *id, const ApiCall *call) {
+    const char *reason = json_get_text(json_get_object(call->reply, "cluster"), "reason");
+    if (reason != NULL && strncmp(show->reason, reason, sizeof show->reason - 1) != 0)
+        command_print_line(stderr, "%s waits for the cluster: %s", id, reason);
+    snprintf(show->reason, sizeof show->reason, "%s", reason != NULL ? reason : "");
+}
 
 static void job_progress_show(JobProgress *show, const char *id, const ApiCall *call) {
     const double percent = json_get_number(call->reply, "progress");
     const double progress = percent >= 0 && percent <= 100 ? percent : 0;
     const char *status = job_text(call, "status");
+    job_reason_show(show, id, call);
     if (show->bar.is_terminal) {
         const Progress watch = progress_bar_watch(&show->bar);
         (void)progress_advance(&watch, progress / 100);

@@ -27,7 +27,7 @@ enum {
 };
 static const double scan_least = 0.2, scan_most = 2; // [s] between looks at the folder
 static const double poll_most = 60;                  // [s] between questions to Slurm
-static const double facts_each = 30;                 // [s]
+static const double facts_each = 5;                  // [s]
 static const double chunk_target = 60;               // [s] of CPU
 static const double audit_share = 0.02;              // of the time since the study began
 

@@ -21,6 +21,10 @@ function stateText({ status, progress, timing: { run } }) {
   return `${number(progress, 3)} % after ${timeText(run)}${left}.`;
 }
 
+const clusterText = ({ chunks, done, running, queued, reason }) =>
+  `On the cluster ${done} of ${chunks} parts are done, ${running} run and ${queued} wait` +
+  `${reason ? `: ${reason}` : ""}.`;
+
 // The rows of a sweep as they finish.
 function SweepRows({ job, path }) {
   const address = useQuery();
@@ -59,6 +63,7 @@ function Run({ first, path }) {
         />${` submitted ${moment(job.created)}. ${stateText(job)}`}
       </p>
       ${isGoing && html`<progress max="100" value=${job.progress} aria-label="Progress"></progress>`}
+      ${job.cluster && html`<p>${clusterText(job.cluster)}</p>`}
       ${
         job.isLost &&
         html`<${Notice}
