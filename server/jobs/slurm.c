@@ -194,7 +194,8 @@ static void facts_read_nodes(char *text, SlurmFacts *facts) {
     if (is_up)
         facts->reason[0] = '\0';
     else if (facts->reason[0] == '\0')
-        text_fit(facts->reason, sizeof facts->reason, "there is no such partition, or it has no nodes");
+        text_fit(facts->reason, sizeof facts->reason,
+                 "there is no such partition, or it has no nodes");
 }
 
 Status slurm_facts(const SlurmSettings *settings, SlurmFacts *facts, Problem *problem) {
