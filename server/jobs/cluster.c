@@ -417,7 +417,8 @@ static void chunk_give_up(ClusterStudy *study, size_t chunk, const char *end, Pr
     chunk_begin(&bytes, &study->key, chunk, count);
     for (size_t i = 0; i < count; i++)
         chunk_add(&bytes, one.at, one.count);
-    if (chunk_save(study->folder, chunk, &bytes, problem) != STATUS_OK)
+    study->chunks[chunk].has_file = chunk_save(study->folder, chunk, &bytes, problem) == STATUS_OK;
+    if (!study->chunks[chunk].has_file)
         study_explain(study, problem->detail);
     bytes_clear(&bytes);
     bytes_clear(&one);
@@ -535,6 +536,7 @@ static bool study_has_space(ClusterStudy *study) {
     (void)unlink(path);
     bytes_clear(&bytes);
     study->is_full = !is_written;
+    study->submit_ns = clock_monotonic_ns() + seconds_ns(study->cluster->settings->poll_seconds);
     return is_written;
 }
 
@@ -573,8 +575,10 @@ static size_t study_choose(const ClusterStudy *study, size_t from, size_t most, 
 static void study_refused(ClusterStudy *study, Status status, size_t count,
                           const Problem *problem) {
     study_explain(study, problem->detail);
-    // It may have the job all the same.
-    study->is_known = status != STATUS_TIMEOUT;
+    if (status == STATUS_TIMEOUT) { // it may have the job all the same
+        study->is_known = false;
+        study->poll_ns = 0;
+    }
     study->window = count > 1 ? count / 2 : 1;
     study->submit_ns = clock_monotonic_ns() + seconds_ns(study->submit_pause);
     study->submit_pause = fmin(2 * study->submit_pause, poll_most);

@@ -140,6 +140,7 @@ Status slurm_tasks(const char *name, SlurmTasks *tasks, Problem *problem) {
     Words words = {.count = 0};
     snprintf(wanted, sizeof wanted, "--name=%s", name);
     const char *const all[] = {"squeue",
+                               "--me",
                                "--noheader",
                                "--array",
                                "--states=all",
