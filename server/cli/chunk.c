@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
-#include <sysexits.h>
 #include <unistd.h>
 
 #include "server/cli/command.h"
@@ -44,7 +43,7 @@ static void chunk_stop(int signal) {
     (void)signal;
     if (chunk_child > 0)
         (void)kill((pid_t)chunk_child, SIGKILL);
-    _exit(EX_TEMPFAIL);
+    _exit(CHUNK_AGAIN);
 }
 
 static bool pipe_write(int pipe, const void *data, size_t size) {
@@ -82,17 +81,17 @@ static int chunk_make_members(const ChunkMaking *making, int pipe) {
         problem_clear(&problem);
         if (study_part_make(making->work, member, &tools, &part, &problem) != STATUS_OK) {
             fprintf(stderr, "impactd chunk: %s\n", problem.detail);
-            return EX_TEMPFAIL;
+            return CHUNK_AGAIN;
         }
         part_blob_write(&bytes, part);
         const uint64_t size = bytes.count;
         if (bytes.is_failed || !pipe_write(pipe, &size, sizeof size) ||
             !pipe_write(pipe, bytes.at, bytes.count))
-            return EX_TEMPFAIL;
+            return CHUNK_AGAIN;
         bytes_clear(&bytes);
         study_part_free(making->work, part);
     }
-    return EX_OK;
+    return CHUNK_MADE;
 }
 
 // Takes what the child writes, member by member; of one that it did not write whole, nothing.
@@ -132,11 +131,11 @@ static bool signal_is_crash(int signal) {
            signal == SIGABRT;
 }
 
-// One child, to its end. Returns an exit code; EX_OK also after a crash, which is a member.
+// One child, to its end. Returns an exit code; CHUNK_MADE also after a crash, which is a member.
 static int chunk_run_child(ChunkMaking *making) {
     int ends[2], state;
     if (pipe(ends) != 0)
-        return EX_OSERR;
+        return CHUNK_AGAIN;
     const pid_t child = fork();
     if (child == 0) {
         (void)signal(SIGTERM, SIG_DFL);
@@ -152,14 +151,14 @@ static int chunk_run_child(ChunkMaking *making) {
         ;
     chunk_child = 0;
     if (child < 0 || making->bytes.is_failed)
-        return EX_TEMPFAIL;
+        return CHUNK_AGAIN;
     if (WIFEXITED(state))
         return WEXITSTATUS(state);
     if (!signal_is_crash(WTERMSIG(state)))
-        return EX_TEMPFAIL;
+        return CHUNK_AGAIN;
     if (making->made < making->count)
         chunk_add_crash(making, WTERMSIG(state));
-    return EX_OK;
+    return CHUNK_MADE;
 }
 
 // The study begun as everywhere; exit code.
@@ -167,10 +166,10 @@ static int chunk_open(ChunkMaking *making, Problem *problem) {
     Status status =
         chunk_folder_read(making->folder, &making->plan, &making->key, &making->request, problem);
     if (status != STATUS_OK)
-        return status == STATUS_IO || status == STATUS_NO_MEMORY ? EX_TEMPFAIL : EX_DATAERR;
+        return status == STATUS_IO || status == STATUS_NO_MEMORY ? CHUNK_AGAIN : CHUNK_BAD;
     if (making->request.study == NULL || making->chunk >= making->plan.chunks) {
         (void)problem_set(problem, STATUS_INVALID, "there is no chunk %zu", making->chunk);
-        return EX_DATAERR;
+        return CHUNK_BAD;
     }
     const SimulationLimits limits = chunk_plan_limits(&making->plan);
     Workspace workspace = {0};
@@ -179,37 +178,37 @@ static int chunk_open(ChunkMaking *making, Problem *problem) {
                          &making->answer, &making->work, problem);
     workspace_clear(&workspace);
     if (status != STATUS_OK)
-        return status == STATUS_NO_MEMORY ? EX_TEMPFAIL : EX_DATAERR;
+        return status == STATUS_NO_MEMORY ? CHUNK_AGAIN : CHUNK_BAD;
     if (making->work->members != making->plan.members) {
         (void)problem_set(problem, STATUS_INVALID, "the study has %zu members here, not %llu",
                           making->work->members, (unsigned long long)making->plan.members);
-        return EX_DATAERR;
+        return CHUNK_BAD;
     }
     making->count = chunk_plan_count(&making->plan, making->chunk);
-    return EX_OK;
+    return CHUNK_MADE;
 }
 
 static int chunk_make(ChunkMaking *making, Problem *problem) {
     ChunkFile made = {.at = 0};
     int code = chunk_open(making, problem);
-    if (code != EX_OK)
+    if (code != CHUNK_MADE)
         return code;
     const Status found =
         chunk_read(making->folder, &making->plan, &making->key, making->chunk, &made, problem);
     bytes_clear(&made.bytes);
     if (found == STATUS_OK) // by another copy of this task
-        return EX_OK;
+        return CHUNK_MADE;
     problem_clear(problem);
     chunk_begin(&making->bytes, &making->key, making->chunk, making->count);
-    while (code == EX_OK && making->made < making->count)
+    while (code == CHUNK_MADE && making->made < making->count)
         code = chunk_run_child(making);
-    if (code != EX_OK) {
+    if (code != CHUNK_MADE) {
         (void)problem_set(problem, STATUS_IO, "stopped after %zu of %zu runs", making->made,
                           making->count);
         return code;
     }
     const Status status = chunk_save(making->folder, making->chunk, &making->bytes, problem);
-    return status == STATUS_OK ? EX_OK : status == STATUS_FULL ? EX_IOERR : EX_TEMPFAIL;
+    return status == STATUS_OK ? CHUNK_MADE : status == STATUS_FULL ? CHUNK_FULL : CHUNK_AGAIN;
 }
 
 static int chunk_run(const Command *self, void *item, const Options *options, Problem *problem) {
@@ -227,7 +226,7 @@ static int chunk_run(const Command *self, void *item, const Options *options, Pr
     (void)signal(SIGTERM, chunk_stop);
     (void)signal(SIGPIPE, SIG_IGN);
     const int code = chunk_make(&making, problem);
-    if (code != EX_OK)
+    if (code != CHUNK_MADE)
         fprintf(stderr, "impactd chunk %zu: %s\n", making.chunk, problem->detail);
     study_free(making.work);
     variant_free(making.answer);

@@ -1,5 +1,4 @@
-#include "server/cli/cluster_check.h"
-
+// impactd check --executor slurm: whether a cluster can make studies, step by step.
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -11,6 +10,7 @@
 
 #include "server/cli/command.h"
 #include "server/jobs/chunk_file.h"
+#include "server/jobs/jobs.h"
 #include "server/jobs/slurm.h"
 #include "server/util/clock.h"
 

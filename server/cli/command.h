@@ -91,6 +91,22 @@ Status scene_edit(const Command *self, const void *settings, Bytes *text, Proble
 // Names the faults of axes that came from --vary by that option.
 void scene_edit_name_axes(const Command *self, const void *settings, Problem *problem);
 
+// The rows of settings with these members, of the commands serve and check.
+enum { EXECUTOR_THREADS, EXECUTOR_SLURM };
+extern const char *const executor_names[];
+// clang-format off
+#define CLUSTER_ROWS(Type, what_) \
+    FIELD_CHOICE(Type, executor, executor_names, EXECUTOR_THREADS, what_), \
+    FIELD_TEXT(Type, shared, 2000, PRESENCE_OPTIONAL, 0, "folder that this machine and all nodes see under the same path, for the chunks of studies"), \
+    FIELD_TEXT(Type, partition, 100, PRESENCE_OPTIONAL, 0, "Slurm's partition (its default)"), \
+    FIELD_TEXTS(Type, sbatch_option, NULL, NULL, 32, PRESENCE_OPTIONAL, 0, "further option for sbatch, as --sbatch-option=--account=lab; repeatable")
+// clang-format on
+// STATUS_USAGE unless the folder is there and only this user may write to it.
+Status cluster_check_folder(const char *shared, Problem *problem);
+// Prints each step and what it found; the last one makes a chunk on a node.
+struct ClusterSettings;
+Status cluster_check(const struct ClusterSettings *cluster, Problem *problem);
+
 // The exit code of a Status.
 int command_exit(Status status);
 

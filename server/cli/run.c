@@ -10,7 +10,6 @@
 #include "core/study/sweep.h"
 #include "core/study/tradeoff.h"
 #include "server/api/job_json.h"
-#include "server/cli/cluster_check.h"
 #include "server/cli/files.h"
 #include "server/cli/report.h"
 #include "server/formats/study_formats.h"

@@ -14,7 +14,6 @@
 #include "core/math/fft.h"
 #include "core/study/sweep.h"
 #include "server/api/app.h"
-#include "server/cli/cluster_check.h"
 #include "server/cli/files.h"
 #include "server/http/server.h"
 #include "server/options.h"

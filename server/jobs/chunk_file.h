@@ -37,6 +37,14 @@ typedef struct ChunkKey {
     unsigned char digest[DIGEST_BYTES];
 } ChunkKey;
 
+// Exit codes of `impactd chunk`, as in sysexits.h.
+enum {
+    CHUNK_MADE = 0,
+    CHUNK_BAD = 65,   // it can never be made
+    CHUNK_FULL = 74,  // there is no space for it
+    CHUNK_AGAIN = 75, // another attempt may succeed
+};
+
 // Makes the folder with the study and the records of the completed request, where they are not
 // there yet. STATUS_FULL, STATUS_IO.
 Status chunk_folder_make(const char *folder, const ChunkPlan *plan, const StudyRequest *request,

@@ -18,8 +18,6 @@
 
 enum {
     ATTEMPTS = 5,
-    BAD_CHUNK = 65, // exit codes of `impactd chunk`
-    DISK_FULL = 74,
     GUESSED_SLOTS = 16,
     PROBE_BYTES = 1 << 20,
     WINDOW_MOST = 4096, // tasks of a study that Slurm has at once
@@ -103,8 +101,8 @@ static void study_explain(ClusterStudy *study, const char *reason) {
         cluster_log(study, reason);
 }
 
-bool cluster_wants(const Cluster *cluster, const StudyKind *kind, double seconds) {
-    return cluster != NULL && seconds >= cluster->settings->seconds &&
+static bool cluster_wants(const Cluster *cluster, const StudyKind *kind, double seconds) {
+    return seconds >= cluster->settings->seconds &&
            (kind == &study_sweep || kind == &study_ensemble || kind == &study_fragility);
 }
 
@@ -119,7 +117,7 @@ static void cluster_look(Cluster *cluster) {
         atomic_store(&cluster->slots, cluster->facts.slots);
 }
 
-size_t cluster_slots(Cluster *cluster) {
+static size_t cluster_slots(Cluster *cluster) {
     SlurmFacts facts;
     const SlurmSettings slurm = cluster_slurm(cluster);
     if (atomic_load(&cluster->slots) == 0 && slurm_facts(&slurm, &facts, NULL) == STATUS_OK)
@@ -130,7 +128,7 @@ size_t cluster_slots(Cluster *cluster) {
 
 // --- a study ---
 
-void cluster_study_free(ClusterStudy *study) {
+static void cluster_study_free(ClusterStudy *study) {
     if (study == NULL)
         return;
     for (size_t i = 0; study->chunks != NULL && i < study->plan.chunks; i++)
@@ -159,7 +157,7 @@ static Status study_plan(ClusterStudy *study, size_t slots, Problem *problem) {
     return STATUS_OK;
 }
 
-Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem) {
+static Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem) {
     const ClusterSettings *settings = cluster->settings;
     const double poll = settings->poll_seconds;
     ClusterStudy *study = run->cluster = calloc(1, sizeof *study);
@@ -194,7 +192,7 @@ Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem) {
     return slurm_make_start(study->folder, problem);
 }
 
-void cluster_take(StudyRun *run) {
+static void cluster_take(StudyRun *run) {
     ClusterStudy *study = run->cluster;
     Cluster *cluster = study->cluster;
     run->task->workers++;
@@ -203,7 +201,7 @@ void cluster_take(StudyRun *run) {
     pthread_cond_broadcast(&run->manager->stopping);
 }
 
-void cluster_view(const ClusterStudy *study, ClusterView *view) {
+static void cluster_view(const ClusterStudy *study, ClusterView *view) {
     *view = (ClusterView){.chunks = study->plan.chunks,
                           .done = study->done,
                           .queued = study->queued,
@@ -437,14 +435,14 @@ static void chunk_ended(ClusterStudy *study, size_t chunk, const SlurmTask *task
         snprintf(end, sizeof end, "Slurm does not know it any more");
     else
         snprintf(end, sizeof end, "%.60s, exit code %d", task->reason, task->exit_code);
-    if (task != NULL && task->exit_code == DISK_FULL) {
+    if (task != NULL && task->exit_code == CHUNK_FULL) {
         of->state = CHUNK_TO_DO;
         study->is_full = true;
-        study_explain(study, "the shared folder is full: the study goes on when there is space");
+        study_explain(study, "the shared folder is full: the study continues when there is space");
         return;
     }
     chunk_is_lost(study, of);
-    if (of->attempts >= ATTEMPTS || (task != NULL && task->exit_code == BAD_CHUNK))
+    if (of->attempts >= ATTEMPTS || (task != NULL && task->exit_code == CHUNK_BAD))
         chunk_give_up(study, chunk, end, problem);
 }
 
@@ -696,9 +694,31 @@ static void *cluster_main(void *context) {
     return NULL;
 }
 
-Status cluster_open(JobManager *manager, const ClusterSettings *settings, Cluster **opened,
-                    Problem *problem) {
-    Cluster *cluster = *opened = calloc(1, sizeof *cluster);
+static void cluster_stop(Cluster *cluster) {
+    if (cluster != NULL && cluster->is_started)
+        (void)pthread_join(cluster->thread, NULL);
+    if (cluster != NULL)
+        cluster->is_started = false;
+}
+
+static void cluster_close(Cluster *cluster) {
+    cluster_stop(cluster);
+    free(cluster);
+}
+
+static const StudyExecutor cluster_executor = {.wants = cluster_wants,
+                                               .slots = cluster_slots,
+                                               .prepare = cluster_prepare,
+                                               .take = cluster_take,
+                                               .view = cluster_view,
+                                               .free = cluster_study_free,
+                                               .stop = cluster_stop,
+                                               .close = cluster_close};
+
+Status cluster_open(JobManager *manager, Problem *problem) {
+    const ClusterSettings *settings = &manager->settings.cluster;
+    Cluster *cluster = manager->cluster = calloc(1, sizeof *cluster);
+    manager->executor = &cluster_executor;
     if (cluster == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the cluster's studies");
     cluster->manager = cluster->worker.manager = manager;
@@ -714,16 +734,4 @@ Status cluster_open(JobManager *manager, const ClusterSettings *settings, Cluste
         return problem_set(problem, STATUS_INTERNAL, "the cluster's thread cannot be started");
     cluster->is_started = true;
     return STATUS_OK;
-}
-
-void cluster_stop(Cluster *cluster) {
-    if (cluster != NULL && cluster->is_started)
-        (void)pthread_join(cluster->thread, NULL);
-    if (cluster != NULL)
-        cluster->is_started = false;
-}
-
-void cluster_close(Cluster *cluster) {
-    cluster_stop(cluster);
-    free(cluster);
 }

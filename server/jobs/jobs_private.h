@@ -141,9 +141,28 @@ typedef struct Worker {
     Workspace workspace;
 } Worker;
 
+// Makes the members of studies elsewhere. Its state is a Cluster, that of a study a ClusterStudy.
+typedef struct Cluster Cluster;
+typedef struct ClusterStudy ClusterStudy;
+typedef struct StudyExecutor {
+    // Whether it makes the members of a study of this kind and predicted CPU time.
+    bool (*wants)(const Cluster *cluster, const StudyKind *kind, double seconds);
+    size_t (*slots)(Cluster *cluster); // runs at once, at most; a guess while that is not known
+    // Prepares a begun study, of a sweep with its chunks. STATUS_FULL, STATUS_IO: not now.
+    Status (*prepare)(Cluster *cluster, struct StudyRun *run, Problem *problem);
+    // With the manager's lock held, as the next: takes a prepared study, with a turn of it, to its
+    // end.
+    void (*take)(struct StudyRun *run);
+    void (*view)(const ClusterStudy *study, ClusterView *view);
+    void (*free)(ClusterStudy *study); // NULL is fine
+    void (*stop)(Cluster *cluster);    // ends its thread
+    void (*close)(Cluster *cluster);
+} StudyExecutor;
+
 struct JobManager {
     Db *db;
-    struct Cluster *cluster; // NULL: all is made here
+    const StudyExecutor *executor; // NULL: the workers make all
+    Cluster *cluster;              // its state
     JobManagerSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;       // for a worker, or space for its result

@@ -136,7 +136,7 @@ Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **opened
     if (status == STATUS_OK)
         status = manager_resume_all(manager, problem);
     if (status == STATUS_OK && settings->cluster.shared != NULL)
-        status = cluster_open(manager, &manager->settings.cluster, &manager->cluster, problem);
+        status = cluster_open(manager, problem);
     if (status == STATUS_OK)
         status = manager_start_workers(manager, problem);
     if (status != STATUS_OK) {
@@ -194,7 +194,8 @@ void jobs_stop(JobManager *manager) {
         return;
     if (manager->is_maintained)
         pthread_join(manager->maintenance, NULL);
-    cluster_stop(manager->cluster);
+    if (manager->executor != NULL)
+        manager->executor->stop(manager->cluster);
     for (size_t i = 0; i < manager->worker_count; i++)
         pthread_join(manager->workers[i].thread, NULL);
     manager_wait_for_writes(manager);
@@ -208,7 +209,8 @@ void jobs_close(JobManager *manager) {
         return;
     jobs_stop(manager);
     manager_wait_for_writes(manager); // of requests that were answered meanwhile
-    cluster_close(manager->cluster);
+    if (manager->executor != NULL)
+        manager->executor->close(manager->cluster);
     lru_free(manager->cache);
     queue_free(manager->queue);
     hashmap_free(manager->jobs);

@@ -183,9 +183,10 @@ static void facts_read_nodes(char *text, SlurmFacts *facts) {
     for (char *line; (line = text_take(&text, '\n')) != NULL;) {
         const char *state = text_take(&line, '|'), *processors = text_take(&line, '|'),
                    *reason = line;
-        unsigned long busy, idle;
-        if (reason == NULL || sscanf(processors, "%lu/%lu/", &busy, &idle) != 2)
+        if (reason == NULL)
             continue;
+        char *end;
+        const size_t busy = strtoul(processors, &end, 10), idle = strtoul(end + 1, NULL, 10);
         facts->slots += busy + idle;
         if (busy + idle > 0)
             is_up = true;

@@ -15,7 +15,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "server/jobs/cluster.h"
 #include "server/util/clock.h"
 #include "server/util/process.h"
 
@@ -389,7 +388,8 @@ void study_run_free(StudyRun *run) {
         run->chunks = chunk->next;
         sweep_chunk_free(chunk);
     }
-    cluster_study_free(run->cluster);
+    if (run->is_clustered)
+        run->manager->executor->free(run->cluster);
     sweep_row_clear(&run->sweep);
     study_engine_close(&run->engine);
     study_free(run->work);
@@ -436,25 +436,27 @@ void task_end(Task *task) {
 }
 
 static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Problem *problem) {
-    const JobManagerSettings *settings = &worker->manager->settings;
+    JobManager *manager = worker->manager;
+    const JobManagerSettings *settings = &manager->settings;
     const StudyRequest *inquiry = &run->task->inquiry;
     ProgressRange range = {&(Progress){run->task, task_advance}, STUDY_OWN, 1 - STUDY_OWN, 0};
     const Progress begin = progress_range_view(&range);
     const Progress members = {run->task, study_advance_task};
     const StudyTools tools = {
         .limits = &settings->limits, .progress = &begin, .workspace = &worker->workspace};
-    Cluster *cluster = worker->manager->cluster;
+    const StudyExecutor *executor = manager->executor;
     run->is_sweep = study_kind(inquiry->study) == &study_sweep;
     run->is_clustered =
-        cluster_wants(cluster, study_kind(inquiry->study), run->task->queued.seconds);
-    const size_t slots = run->is_clustered ? cluster_slots(cluster) : settings->workers;
+        executor != NULL &&
+        executor->wants(manager->cluster, study_kind(inquiry->study), run->task->queued.seconds);
+    const size_t slots = run->is_clustered ? executor->slots(manager->cluster) : settings->workers;
     TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &answer->study, &run->work,
                     problem));
     TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
                           run->is_sweep ? 0 : settings->workers, problem));
     if (run->is_sweep)
         TRY(sweep_open(run, slots, problem));
-    return run->is_clustered ? cluster_prepare(cluster, run, problem) : STATUS_OK;
+    return run->is_clustered ? executor->prepare(manager->cluster, run, problem) : STATUS_OK;
 }
 
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
@@ -478,7 +480,7 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     run->next = manager->studies;
     manager->studies = run;
     if (run->is_clustered)
-        cluster_take(run);
+        manager->executor->take(run);
     study_enqueue(run);
     pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;

@@ -64,7 +64,7 @@ typedef struct StudyRun {
     // Of a sweep, whose parts are not folded: rows in the database, chunk by chunk.
     bool is_sweep;
     bool is_clustered; // a cluster makes the members, not the workers
-    struct ClusterStudy *cluster;
+    ClusterStudy *cluster;
     SweepRow sweep;
     atomic_size_t chunks_left;            // that are not saved
     atomic_size_t rows_made, rows_failed; // the failed ones are made too

@@ -1,5 +1,4 @@
 // Jobs as their readers see them.
-#include "server/jobs/cluster.h"
 #include "server/jobs/study.h"
 #include "server/util/clock.h"
 
@@ -16,7 +15,7 @@ static void job_view_progress(const Job *job, JobView *view) {
         view->points_failed = atomic_load(&task->study->rows_failed);
     }
     if (task != NULL && task->study != NULL && task->study->cluster != NULL)
-        cluster_view(task->study->cluster, &view->cluster);
+        task->manager->executor->view(task->study->cluster, &view->cluster);
     if (!job_state_is_final(job->row.state) && job->submitted_ns > 0) {
         const int64_t now = clock_monotonic_ns();
         view->row.total = 1e-9 * (double)(now - job->submitted_ns);

@@ -6,9 +6,9 @@
 #include "server/util/bytes.h"
 
 // Runs a program of the PATH with these arguments (NULL-terminated, the first is its name) and
-// waits for its end. What it prints on standard output is added to `output`. STATUS_NOT_FOUND:
+// waits for its end. What it prints is added to `output`, with its messages. STATUS_NOT_FOUND:
 // there is no such program; STATUS_TIMEOUT: it was killed after `seconds`; STATUS_IO: it failed,
-// and the problem says what it printed on standard error.
+// and the problem has the first line that it printed.
 Status subprocess_run(const char *const *arguments, double seconds, Bytes *output,
                       Problem *problem);
 
