@@ -183,7 +183,7 @@ static void facts_read_nodes(char *text, SlurmFacts *facts) {
     for (char *line; (line = text_take(&text, '\n')) != NULL;) {
         const char *state = text_take(&line, '|'), *processors = text_take(&line, '|'),
                    *reason = line;
-        if (reason == NULL)
+        if (reason == NULL || strchr(processors, '/') == NULL)
             continue;
         char *end;
         const size_t busy = strtoul(processors, &end, 10), idle = strtoul(end + 1, NULL, 10);
