@@ -264,53 +264,63 @@ static Status records_each(const char *folder, Db *db, const StudyRequest *reque
     return status;
 }
 
-static void key_of(const Bytes *text, ChunkKey *key) {
-    sha256_sum(text->at, text->count, key->digest);
+// The file `study`. The plan is cleared by the caller in any case.
+static Status plan_read(const char *folder, ChunkPlan *plan, ChunkKey *key, Problem *problem) {
+    char path[PATH_MAX];
+    Bytes text;
+    *plan = (ChunkPlan){.engine = NULL};
+    snprintf(path, sizeof path, "%.3000s/study", folder);
+    Status status = file_get(path, &text, problem);
+    if (status == STATUS_OK) {
+        sha256_sum(text.at, text.count, key->digest);
+        status = json_parse(text.at, text.count, plan_fields, plan, problem);
+    }
+    bytes_clear(&text);
+    return status == STATUS_OK ? fields_validate(plan_fields, plan, "", problem) : status;
 }
 
-Status chunk_folder_make(const char *folder, const ChunkPlan *plan, const StudyRequest *request,
-                         Db *db, ChunkKey *key, Problem *problem) {
+static bool plan_is_of(const ChunkPlan *plan, const ChunkPlan *other) {
+    return strcmp(plan->engine, other->engine) == 0 && strcmp(plan->scene, other->scene) == 0 &&
+           plan->members == other->members && plan->is_strided == other->is_strided &&
+           (!plan->is_strided || plan->chunks == other->chunks) && plan->steps == other->steps &&
+           plan->samples == other->samples && plan->impacts == other->impacts &&
+           plan->bytes == other->bytes;
+}
+
+Status chunk_folder_make(const char *folder, ChunkPlan *plan, const StudyRequest *request, Db *db,
+                         ChunkKey *key, Problem *problem) {
     static const char *const parts[] = {"", "/records", "/chunks", "/log"};
     char path[PATH_MAX];
-    Bytes text = {0}, stored;
+    Bytes text = {0};
+    ChunkPlan stored;
     for (size_t i = 0; i < COUNT(parts); i++) {
         snprintf(path, sizeof path, "%.3000s%s", folder, parts[i]);
         TRY(file_folder(path, problem));
     }
+    const bool is_there =
+        plan_read(folder, &stored, key, NULL) == STATUS_OK && plan_is_of(plan, &stored);
+    if (is_there)
+        plan->chunks = stored.chunks;
+    chunk_plan_clear(&stored);
+    if (is_there)
+        return STATUS_OK;
     encode_item(&text, plan_fields, plan, WRITE_SCENE);
     if (text.is_failed)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a study's chunks");
-    key_of(&text, key);
-    snprintf(path, sizeof path, "%.3000s/study", folder);
-    Status status = file_get(path, &stored, NULL);
+    sha256_sum(text.at, text.count, key->digest);
     // The study comes last: where it is there, so are its records.
-    if (status != STATUS_OK || stored.count != text.count ||
-        memcmp(stored.at, text.at, text.count) != 0) {
-        status = records_each(folder, db, request, false, problem);
-        if (status == STATUS_OK)
-            status = file_put(folder, "/", "study", &text, problem);
-    }
-    bytes_clear(&stored);
+    Status status = records_each(folder, db, request, false, problem);
+    if (status == STATUS_OK)
+        status = file_put(folder, "/", "study", &text, problem);
     bytes_clear(&text);
     return status;
 }
 
 Status chunk_folder_read(const char *folder, ChunkPlan *plan, ChunkKey *key, StudyRequest *request,
                          Problem *problem) {
-    char path[PATH_MAX];
-    Bytes text;
     Db *db = NULL;
-    *plan = (ChunkPlan){.engine = NULL};
     *request = (StudyRequest){.study = NULL};
-    snprintf(path, sizeof path, "%.3000s/study", folder);
-    Status status = file_get(path, &text, problem);
-    if (status == STATUS_OK) {
-        key_of(&text, key);
-        status = json_parse(text.at, text.count, plan_fields, plan, problem);
-    }
-    bytes_clear(&text);
-    TRY(status);
-    TRY(fields_validate(plan_fields, plan, "", problem));
+    TRY(plan_read(folder, plan, key, problem));
     if (strcmp(plan->engine, engine_version) != 0)
         return problem_set(problem, STATUS_INVALID,
                            "this program has the engine %s, the study is for %s: install the same "
@@ -318,7 +328,7 @@ Status chunk_folder_read(const char *folder, ChunkPlan *plan, ChunkKey *key, Stu
                            engine_version, plan->engine);
     TRY(json_parse(plan->scene, strlen(plan->scene), study_request_fields, request, problem));
     TRY(db_open(NULL, &db, problem));
-    status = records_each(folder, db, request, true, problem);
+    Status status = records_each(folder, db, request, true, problem);
     if (status == STATUS_OK)
         status = request_load_records(db, request, problem);
     db_close(db);

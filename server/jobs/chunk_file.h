@@ -46,9 +46,10 @@ enum {
 };
 
 // Makes the folder with the study and the records of the completed request, where they are not
-// there yet. STATUS_FULL, STATUS_IO.
-Status chunk_folder_make(const char *folder, const ChunkPlan *plan, const StudyRequest *request,
-                         Db *db, ChunkKey *key, Problem *problem);
+// there yet. A study that is there keeps its number of chunks, which the plan takes. STATUS_FULL,
+// STATUS_IO.
+Status chunk_folder_make(const char *folder, ChunkPlan *plan, const StudyRequest *request, Db *db,
+                         ChunkKey *key, Problem *problem);
 // Reads it back: the request is complete, with its records. Both are cleared by the caller in any
 // case. STATUS_INVALID: the folder has no study of this engine.
 Status chunk_folder_read(const char *folder, ChunkPlan *plan, ChunkKey *key, StudyRequest *request,

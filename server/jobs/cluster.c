@@ -175,6 +175,8 @@ static Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem)
     snprintf(study->folder, sizeof study->folder, "%.3000s/%s-%llu", settings->shared,
              run->task->result, (unsigned long long)run->sweep.retries);
     TRY(study_plan(study, cluster_slots(cluster), problem));
+    TRY(chunk_folder_make(study->folder, &study->plan, &run->task->inquiry, run->manager->db,
+                          &study->key, problem));
     study->chunks = calloc((size_t)study->plan.chunks, sizeof *study->chunks);
     if (study->chunks == NULL)
         return study_result(STATUS_NO_MEMORY, problem);
@@ -187,8 +189,6 @@ static Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem)
     }
     for (size_t i = 0; i < study->plan.chunks; i++)
         study->done += study->chunks[i].state == CHUNK_DONE;
-    TRY(chunk_folder_make(study->folder, &study->plan, &run->task->inquiry, run->manager->db,
-                          &study->key, problem));
     return slurm_make_start(study->folder, problem);
 }
 
