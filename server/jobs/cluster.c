@@ -632,6 +632,7 @@ static bool study_is_at_end(const ClusterStudy *study) {
 static void study_step(ClusterStudy *study, Problem *problem) {
     int64_t now_ns = clock_monotonic_ns();
     problem_clear(problem);
+    task_count_cpu();
     if (now_ns >= study->scan_ns)
         study_scan(study, problem);
     problem_clear(problem);
