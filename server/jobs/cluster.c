@@ -117,11 +117,7 @@ static void cluster_look(Cluster *cluster) {
         atomic_store(&cluster->slots, cluster->facts.slots);
 }
 
-static size_t cluster_slots(Cluster *cluster) {
-    SlurmFacts facts;
-    const SlurmSettings slurm = cluster_slurm(cluster);
-    if (atomic_load(&cluster->slots) == 0 && slurm_facts(&slurm, &facts, NULL) == STATUS_OK)
-        atomic_store(&cluster->slots, facts.slots);
+static size_t cluster_slots(const Cluster *cluster) {
     const size_t slots = atomic_load(&cluster->slots);
     return slots > 0 ? slots : GUESSED_SLOTS;
 }
@@ -695,15 +691,9 @@ static void *cluster_main(void *context) {
     return NULL;
 }
 
-static void cluster_stop(Cluster *cluster) {
+static void cluster_close(Cluster *cluster) {
     if (cluster != NULL && cluster->is_started)
         (void)pthread_join(cluster->thread, NULL);
-    if (cluster != NULL)
-        cluster->is_started = false;
-}
-
-static void cluster_close(Cluster *cluster) {
-    cluster_stop(cluster);
     free(cluster);
 }
 
@@ -713,7 +703,6 @@ static const StudyExecutor cluster_executor = {.wants = cluster_wants,
                                                .take = cluster_take,
                                                .view = cluster_view,
                                                .free = cluster_study_free,
-                                               .stop = cluster_stop,
                                                .close = cluster_close};
 
 Status cluster_open(JobManager *manager, Problem *problem) {

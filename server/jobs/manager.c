@@ -195,7 +195,7 @@ void jobs_stop(JobManager *manager) {
     if (manager->is_maintained)
         pthread_join(manager->maintenance, NULL);
     if (manager->executor != NULL)
-        manager->executor->stop(manager->cluster);
+        manager->executor->close(manager->cluster);
     for (size_t i = 0; i < manager->worker_count; i++)
         pthread_join(manager->workers[i].thread, NULL);
     manager_wait_for_writes(manager);
@@ -209,8 +209,6 @@ void jobs_close(JobManager *manager) {
         return;
     jobs_stop(manager);
     manager_wait_for_writes(manager); // of requests that were answered meanwhile
-    if (manager->executor != NULL)
-        manager->executor->close(manager->cluster);
     lru_free(manager->cache);
     queue_free(manager->queue);
     hashmap_free(manager->jobs);
