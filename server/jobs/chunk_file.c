@@ -222,10 +222,10 @@ static Status record_put(const char *folder, Db *db, const char *name, Problem *
 }
 
 static Status record_get(const char *folder, Db *db, const char *name, Problem *problem) {
-    char path[PATH_MAX], copy[RECORD_NAME_SIZE];
+    char path[PATH_MAX], copy[RECORD_NAME_SIZE], layout[] = "json";
     Bytes bytes;
     Reals samples = {NULL, 0};
-    RecordRow row = {.name = copy};
+    RecordRow row = {.name = copy, .layout = layout};
     bool is_there;
     snprintf(path, sizeof path, "%.3000s/records/%s", folder, name);
     text_fit(copy, sizeof copy, name);
@@ -242,7 +242,7 @@ static Status record_get(const char *folder, Db *db, const char *name, Problem *
     }
     if (status == STATUS_OK)
         status = db_record_add(db, &row, &samples, &is_there, problem);
-    row.name = NULL;
+    row.name = row.layout = NULL;
     record_row_clear(&row);
     free(samples.at);
     bytes_clear(&bytes);
