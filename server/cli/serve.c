@@ -350,6 +350,7 @@ static Status serve_open_jobs(App *app, const ServeSettings *settings, Problem *
         .has_maintenance = true,
         .keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes},
         .cluster = {.shared = settings->executor == EXECUTOR_SLURM ? settings->shared : NULL,
+                    .data = settings->data,
                     .partition = settings->partition,
                     .options = settings->sbatch_option,
                     .seconds = settings->cluster_seconds,

@@ -1,3 +1,4 @@
+#define _XOPEN_SOURCE 700 // realpath
 #include "server/jobs/cluster.h"
 
 #include <dirent.h>
@@ -22,10 +23,14 @@ enum {
     PROBE_BYTES = 1 << 20,
     WINDOW_MOST = 4096, // tasks of a study that Slurm has at once
     CHUNK_BYTES = 64 << 20,
+    NAME_SIZE = 120,
+    RESULT_SIZE = 66, // of a result's id
 };
+static const char prefix[] = "impactd-", gone[] = ".gone"; // of the name of a study, after it
 static const double scan_least = 0.2, scan_most = 2; // [s] between looks at the folder
 static const double poll_most = 60;                  // [s] between questions to Slurm
 static const double facts_each = 5;                  // [s]
+static const double tidy_each = 1;                   // [s]
 static const double chunk_target = 60;               // [s] of CPU
 static const double audit_share = 0.02;              // of the time since the study began
 
@@ -44,7 +49,8 @@ typedef struct ClusterStudy {
     StudyRun *run;
     ChunkPlan plan;
     ChunkKey key;
-    char name[64], folder[PATH_MAX];
+    char name[NAME_SIZE]; // of its folder, and of its jobs
+    char folder[PATH_MAX];
     ClusterChunk *chunks;
     size_t first;  // all before it are done
     size_t window; // tasks that Slurm takes at once, as far as is known
@@ -54,19 +60,20 @@ typedef struct ClusterStudy {
     double scan_pause, poll_pause, submit_pause, audit_seconds;
     // Under the manager's lock:
     size_t done, queued, running;
-    char reason[240];
+    char reason[240], logged[240];
 } ClusterStudy;
 
 struct Cluster {
     JobManager *manager;
     const ClusterSettings *settings;
-    char program[PATH_MAX];
+    char program[PATH_MAX], id[9];
+    pthread_mutex_t folders; // no study's folder is made and deleted at once
     pthread_t thread;
     bool is_started;
     Worker worker;         // ends studies
     ClusterStudy *studies; // under the manager's lock
     SlurmFacts facts;      // of the thread alone
-    int64_t facts_ns;
+    int64_t facts_ns, tidy_ns;
     atomic_size_t slots;
 };
 
@@ -78,27 +85,24 @@ static int64_t seconds_ns(double seconds) {
     return (int64_t)(1e9 * seconds);
 }
 
-static void cluster_log(const ClusterStudy *study, const char *what) {
-    Bytes line = {.most = 1024};
-    bytes_format(&line, "the study %.20s on the cluster: %s", study->run->task->result, what);
-    log_write(&line);
-    bytes_clear(&line);
-}
-
 // What its readers see; "": nothing is wrong.
-static bool study_set_reason(ClusterStudy *study, const char *reason) {
+static void study_set_reason(ClusterStudy *study, const char *reason) {
     JobManager *manager = study->cluster->manager;
     pthread_mutex_lock(&manager->lock);
-    const bool is_new = strcmp(study->reason, reason) != 0;
     text_fit(study->reason, sizeof study->reason, reason);
     pthread_mutex_unlock(&manager->lock);
-    return is_new;
 }
 
 // What went wrong, which is logged too.
 static void study_explain(ClusterStudy *study, const char *reason) {
-    if (study_set_reason(study, reason))
-        cluster_log(study, reason);
+    Bytes line = {.most = 1024};
+    study_set_reason(study, reason);
+    if (strcmp(study->logged, study->reason) == 0)
+        return;
+    text_fit(study->logged, sizeof study->logged, reason);
+    bytes_format(&line, "the study %.20s on the cluster: %s", study->run->task->result, reason);
+    log_write(&line);
+    bytes_clear(&line);
 }
 
 static bool cluster_wants(const Cluster *cluster, const StudyKind *kind, double seconds) {
@@ -112,12 +116,20 @@ static void cluster_look(Cluster *cluster) {
     const int64_t now_ns = clock_monotonic_ns();
     if (cluster->facts_ns > 0 && now_ns - cluster->facts_ns < seconds_ns(facts_each))
         return;
+    SlurmFacts facts;
+    if (slurm_facts(&slurm, &facts, NULL) != STATUS_OK)
+        return;
+    cluster->facts = facts;
     cluster->facts_ns = now_ns;
-    if (slurm_facts(&slurm, &cluster->facts, NULL) == STATUS_OK && cluster->facts.slots > 0)
-        atomic_store(&cluster->slots, cluster->facts.slots);
+    if (facts.slots > 0)
+        atomic_store(&cluster->slots, facts.slots);
 }
 
-static size_t cluster_slots(const Cluster *cluster) {
+static size_t cluster_slots(Cluster *cluster) {
+    SlurmFacts facts;
+    const SlurmSettings slurm = cluster_slurm(cluster);
+    if (atomic_load(&cluster->slots) == 0 && slurm_facts(&slurm, &facts, NULL) == STATUS_OK)
+        atomic_store(&cluster->slots, facts.slots);
     const size_t slots = atomic_load(&cluster->slots);
     return slots > 0 ? slots : GUESSED_SLOTS;
 }
@@ -166,13 +178,15 @@ static Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem)
                             .scan_pause = scan_least,
                             .poll_pause = poll,
                             .submit_pause = poll};
-    snprintf(study->name, sizeof study->name, "impactd-%.34s-%llu", run->task->result,
-             (unsigned long long)run->sweep.retries);
-    snprintf(study->folder, sizeof study->folder, "%.3000s/%s-%llu", settings->shared,
-             run->task->result, (unsigned long long)run->sweep.retries);
+    snprintf(study->name, sizeof study->name, "%s%s-%s-%llu", prefix, run->task->result,
+             cluster->id, (unsigned long long)run->sweep.retries);
+    snprintf(study->folder, sizeof study->folder, "%.3000s/%s", settings->shared, study->name);
     TRY(study_plan(study, cluster_slots(cluster), problem));
-    TRY(chunk_folder_make(study->folder, &study->plan, &run->task->inquiry, run->manager->db,
-                          &study->key, problem));
+    pthread_mutex_lock(&cluster->folders);
+    const Status made = chunk_folder_make(study->folder, &study->plan, &run->task->inquiry,
+                                          run->manager->db, &study->key, problem);
+    pthread_mutex_unlock(&cluster->folders);
+    TRY(made);
     study->chunks = calloc((size_t)study->plan.chunks, sizeof *study->chunks);
     if (study->chunks == NULL)
         return study_result(STATUS_NO_MEMORY, problem);
@@ -287,11 +301,36 @@ static Status chunk_fold(ClusterStudy *study, size_t chunk, ChunkFile *file, Pro
     return status;
 }
 
-static void chunk_is_lost(ClusterStudy *study, ClusterChunk *chunk) {
-    chunk->state = CHUNK_TO_DO;
-    chunk->has_file = chunk->was_missing = false;
-    chunk->attempts++;
+// No machine can make the chunk: its members are runs that failed.
+static void chunk_give_up(ClusterStudy *study, size_t chunk, char *why, Problem *problem) {
+    const size_t count = chunk_plan_count(&study->plan, chunk);
+    StudyPart part = {.run = {.status = STATUS_IO, .why = why, .steps = (double)NAN}};
+    Bytes bytes = {0}, one = {0};
+    (void)fields_default(summary_fields, &part.run.summary);
+    (void)fields_default(reduction_fields, &part.run.reduction);
+    part_blob_write(&one, &part);
+    chunk_begin(&bytes, &study->key, chunk, count);
+    for (size_t i = 0; i < count; i++)
+        chunk_add(&bytes, one.at, one.count);
+    study->chunks[chunk].has_file = chunk_save(study->folder, chunk, &bytes, problem) == STATUS_OK;
+    if (!study->chunks[chunk].has_file)
+        study_explain(study, problem->detail);
+    bytes_clear(&bytes);
+    bytes_clear(&one);
+}
+
+// It is made again, if it may be and was not tried too often.
+static void chunk_is_lost(ClusterStudy *study, size_t chunk, bool is_final, const char *why,
+                          Problem *problem) {
+    ClusterChunk *of = &study->chunks[chunk];
+    char copy[240];
+    text_fit(copy, sizeof copy, why);
+    of->state = CHUNK_TO_DO;
+    of->has_file = of->was_missing = false;
     study->submit_ns = 0;
+    study_explain(study, copy);
+    if (++of->attempts >= ATTEMPTS || is_final)
+        chunk_give_up(study, chunk, copy, problem);
 }
 
 // Takes a chunk whose file is there. A file that is not right is made again. A failure is the
@@ -310,9 +349,8 @@ static Status chunk_ingest(ClusterStudy *study, size_t chunk, Problem *problem) 
         status = chunk_fold(study, chunk, &file, problem);
     bytes_clear(&file.bytes);
     if (status == STATUS_NOT_FOUND || status == STATUS_INVALID) {
-        study_explain(study, problem->detail);
         (void)unlink(path);
-        chunk_is_lost(study, of);
+        chunk_is_lost(study, chunk, false, problem->detail, problem);
         return STATUS_OK;
     }
     TRY(status);
@@ -377,11 +415,10 @@ static void study_scan(ClusterStudy *study, Problem *problem) {
 
 // --- what Slurm knows ---
 
-// The end of what a chunk's worker printed.
-static void chunk_log(const ClusterStudy *study, size_t chunk, char text[160]) {
+// The last line that a task printed.
+static void task_log(const ClusterStudy *study, const SlurmTask *task, char text[160]) {
     char path[PATH_MAX], tail[512] = "";
-    snprintf(path, sizeof path, "%.3000s/log/%zu", study->folder,
-             chunk % study->cluster->facts.array_max);
+    snprintf(path, sizeof path, "%.3000s/log/%s", study->folder, task->id);
     FILE *file = fopen(path, "re");
     if (file != NULL) {
         if (fseek(file, -(long)sizeof tail + 1, SEEK_END) != 0)
@@ -395,51 +432,57 @@ static void chunk_log(const ClusterStudy *study, size_t chunk, char text[160]) {
     text_fit(text, 160, line != NULL ? line + 1 : tail);
 }
 
-// No machine can make the chunk: its members are runs that failed.
-static void chunk_give_up(ClusterStudy *study, size_t chunk, const char *end, Problem *problem) {
-    const size_t count = chunk_plan_count(&study->plan, chunk);
-    char why[240], printed[160];
-    StudyPart part = {.run = {.status = STATUS_IO, .why = why, .steps = (double)NAN}};
-    Bytes bytes = {0}, one = {0};
-    chunk_log(study, chunk, printed);
-    snprintf(why, sizeof why, "the cluster could not run it (%.60s)%s%.120s", end,
-             printed[0] != '\0' ? ": " : "", printed);
-    study_explain(study, why);
-    (void)fields_default(summary_fields, &part.run.summary);
-    (void)fields_default(reduction_fields, &part.run.reduction);
-    part_blob_write(&one, &part);
-    chunk_begin(&bytes, &study->key, chunk, count);
-    for (size_t i = 0; i < count; i++)
-        chunk_add(&bytes, one.at, one.count);
-    study->chunks[chunk].has_file = chunk_save(study->folder, chunk, &bytes, problem) == STATUS_OK;
-    if (!study->chunks[chunk].has_file)
-        study_explain(study, problem->detail);
-    bytes_clear(&bytes);
-    bytes_clear(&one);
+// Whether there is space for chunks, where there was none. What lies in the folder is seen afresh.
+static bool study_has_space(ClusterStudy *study) {
+    static const char block[1 << 16] = {1};
+    const size_t chunk = chunk_plan_count(&study->plan, 0) * study->run->work->part_bytes;
+    const size_t size = chunk > PROBE_BYTES ? chunk : PROBE_BYTES;
+    char path[PATH_MAX];
+    if (!study->is_full)
+        return true;
+    snprintf(path, sizeof path, "%.3000s/chunks/probe", study->folder);
+    FILE *file = fopen(path, "we");
+    bool is_written = file != NULL;
+    for (size_t i = 0; is_written && i < size; i += sizeof block)
+        is_written = fwrite(block, 1, sizeof block, file) == sizeof block;
+    is_written = file != NULL && fclose(file) == 0 && is_written;
+    (void)unlink(path);
+    study->is_full = !is_written;
+    study->submit_ns = clock_monotonic_ns() + seconds_ns(study->cluster->settings->poll_seconds);
+    return is_written;
 }
 
-// A task of this chunk ended without a file that is seen here. The folder may show it late.
+// The last task of this chunk (NULL: Slurm knows none any more) ended, and no file of it is seen
+// here: the folder may show it late.
 static void chunk_ended(ClusterStudy *study, size_t chunk, const SlurmTask *task,
                         Problem *problem) {
     ClusterChunk *of = &study->chunks[chunk];
-    char end[120];
+    char printed[160] = "", why[240], path[PATH_MAX];
+    const int code = task != NULL ? task->exit_code : 0;
     if (!of->was_missing) {
         of->was_missing = true;
         return;
     }
-    if (task == NULL)
-        snprintf(end, sizeof end, "Slurm does not know it any more");
-    else
-        snprintf(end, sizeof end, "%.60s, exit code %d", task->reason, task->exit_code);
-    if (task != NULL && task->exit_code == CHUNK_FULL) {
+    // Without space Slurm cannot even begin a task.
+    const bool was_full = study->is_full;
+    study->is_full = true;
+    const bool has_space = study_has_space(study);
+    study->is_full = was_full || !has_space || code == CHUNK_FULL;
+    snprintf(path, sizeof path, "%.3000s/chunks/%zu", study->folder, chunk);
+    if (access(path, F_OK) == 0) {
+        of->has_file = true;
+    } else if (study->is_full) {
         of->state = CHUNK_TO_DO;
-        study->is_full = true;
+        of->was_missing = false;
         study_explain(study, "the shared folder is full: the study continues when there is space");
-        return;
+    } else {
+        if (task != NULL)
+            task_log(study, task, printed);
+        snprintf(why, sizeof why, "the cluster could not run it (%.60s, exit code %d)%s%.120s",
+                 task != NULL ? task->reason : "Slurm does not know it any more", code,
+                 printed[0] != '\0' ? ": " : "", printed);
+        chunk_is_lost(study, chunk, code == CHUNK_BAD, why, problem);
     }
-    chunk_is_lost(study, of);
-    if (of->attempts >= ATTEMPTS || (task != NULL && task->exit_code == CHUNK_BAD))
-        chunk_give_up(study, chunk, end, problem);
 }
 
 static void study_apply_tasks(ClusterStudy *study, const SlurmTasks *tasks, Problem *problem) {
@@ -454,7 +497,7 @@ static void study_apply_tasks(ClusterStudy *study, const SlurmTasks *tasks, Prob
         if (task->chunk >= study->plan.chunks)
             continue;
         ClusterChunk *chunk = &study->chunks[task->chunk];
-        if (last != NULL)
+        if (last != NULL && (last[task->chunk] == NULL || last[task->chunk]->job <= task->job))
             last[task->chunk] = task;
         if (task->state == SLURM_HELD)
             (void)slurm_cancel(task->id, true, NULL);
@@ -469,24 +512,27 @@ static void study_apply_tasks(ClusterStudy *study, const SlurmTasks *tasks, Prob
         if (task->state == SLURM_QUEUED && reason == NULL)
             reason = task->reason;
     }
-    (void)study_look(study);
-    for (size_t i = study->first; i < study->plan.chunks; i++) {
+    const bool is_seen = study_look(study);
+    bool is_same = true;
+    for (size_t i = study->first; is_seen && last != NULL && i < study->plan.chunks; i++) {
         const ClusterChunk *chunk = &study->chunks[i];
-        if (chunk->state == CHUNK_SUBMITTED && !chunk->is_live && !chunk->has_file)
-            chunk_ended(study, i, last != NULL ? last[i] : NULL, problem);
+        if (chunk->state == CHUNK_SUBMITTED && !chunk->is_live && !chunk->has_file) {
+            chunk_ended(study, i, last[i], problem);
+            is_same = false;
+        }
     }
     free(last);
     pthread_mutex_lock(&manager->lock);
-    const bool is_same = study->queued == queued && study->running == running;
+    is_same = is_same && study->queued == queued && study->running == running;
     study->queued = queued;
     study->running = running;
     pthread_mutex_unlock(&manager->lock);
     if (running > 0) {
-        (void)study_set_reason(study, "");
+        study_set_reason(study, "");
     } else if (queued > 0) {
         const SlurmFacts *facts = &study->cluster->facts;
         cluster_look(study->cluster);
-        (void)study_set_reason(study, facts->reason[0] != '\0' ? facts->reason : reason);
+        study_set_reason(study, facts->reason[0] != '\0' ? facts->reason : reason);
     }
     const double least = study->cluster->settings->poll_seconds;
     study->poll_pause = is_same ? fmin(1.5 * study->poll_pause, fmax(poll_most, least)) : least;
@@ -512,27 +558,6 @@ static void study_poll(ClusterStudy *study, Problem *problem) {
 }
 
 // --- what is sent ---
-
-// Whether there is space again for chunks.
-static bool study_has_space(ClusterStudy *study) {
-    char path[PATH_MAX];
-    Bytes bytes = {0};
-    snprintf(path, sizeof path, "%.3000s/probe", study->folder);
-    if (!study->is_full)
-        return true;
-    FILE *file = fopen(path, "we");
-    bool is_written = file != NULL && bytes_reserve(&bytes, PROBE_BYTES);
-    if (is_written) {
-        memset(bytes.at, 1, PROBE_BYTES);
-        is_written = fwrite(bytes.at, 1, PROBE_BYTES, file) == PROBE_BYTES;
-    }
-    is_written = file != NULL && fclose(file) == 0 && is_written;
-    (void)unlink(path);
-    bytes_clear(&bytes);
-    study->is_full = !is_written;
-    study->submit_ns = clock_monotonic_ns() + seconds_ns(study->cluster->settings->poll_seconds);
-    return is_written;
-}
 
 // Members beyond those that are expected may not be wanted.
 static bool study_wants_chunk(const ClusterStudy *study, size_t chunk) {
@@ -566,20 +591,18 @@ static size_t study_choose(const ClusterStudy *study, size_t from, size_t most, 
     return count;
 }
 
-static void study_refused(ClusterStudy *study, Status status, size_t count,
-                          const Problem *problem) {
+// Slurm may have the job all the same: it is asked before the next.
+static void study_refused(ClusterStudy *study, size_t live, size_t count, const Problem *problem) {
     study_explain(study, problem->detail);
-    if (status == STATUS_TIMEOUT) { // it may have the job all the same
-        study->is_known = false;
-        study->poll_ns = 0;
-    }
-    study->window = count > 1 ? count / 2 : 1;
-    study->submit_ns = clock_monotonic_ns() + seconds_ns(study->submit_pause);
+    study->is_known = false;
+    study->window = live + count / 2 > 0 ? live + count / 2 : 1;
+    study->submit_ns = study->poll_ns = clock_monotonic_ns() + seconds_ns(study->submit_pause);
     study->submit_pause = fmin(2 * study->submit_pause, poll_most);
 }
 
 static void study_submit(ClusterStudy *study, Problem *problem) {
     Cluster *cluster = study->cluster;
+    cluster_look(cluster);
     const size_t each = cluster->facts.array_max;
     const SlurmSettings slurm = cluster_slurm(cluster);
     const double seconds = study->run->task->queued.seconds / (double)study->plan.chunks;
@@ -601,7 +624,7 @@ static void study_submit(ClusterStudy *study, Problem *problem) {
             status = tasks.is_failed ? STATUS_NO_MEMORY : slurm_submit(&slurm, &array, problem);
         bytes_clear(&tasks);
         if (status != STATUS_OK) {
-            study_refused(study, status, count, problem);
+            study_refused(study, live, count, problem);
             return;
         }
         for (size_t i = at; count > 0 && i < end; i++)
@@ -641,22 +664,51 @@ static void study_step(ClusterStudy *study, Problem *problem) {
         study_submit(study, problem);
 }
 
-// It is in no list any more. What runs for a study that is over is cancelled; a daemon that ends
-// leaves it.
-static void study_close(ClusterStudy *study, bool is_closing, Problem *problem) {
-    Cluster *cluster = study->cluster;
-    StudyRun *run = study->run;
-    const bool is_stopped = atomic_load(&run->task->is_stopped);
-    if (!is_closing || !is_stopped) {
-        if (!study->is_known || study->queued + study->running > 0 ||
-            study->done < study->plan.chunks)
-            (void)slurm_cancel(study->name, false, NULL);
-        chunk_folder_remove(study->folder);
+// Cancels and deletes what is left of studies that no job wants any more. Names are taken away
+// first, so that no worker writes there meanwhile. Returns whether anything is left.
+static bool cluster_tidy_one(Cluster *cluster, const char *entry) {
+    const char *shared = cluster->settings->shared, *end = strstr(entry, gone);
+    JobManager *manager = cluster->manager;
+    char path[PATH_MAX], away[PATH_MAX], name[NAME_SIZE], result[RESULT_SIZE + 1];
+    snprintf(name, sizeof name, "%.*s", (int)(end != NULL ? end - entry : NAME_SIZE - 1), entry);
+    snprintf(path, sizeof path, "%.3000s/%s", shared, name);
+    snprintf(away, sizeof away, "%.3000s/%s%s", shared, name, gone);
+    snprintf(result, sizeof result, "%.66s", name + sizeof prefix - 1);
+    if (end == NULL) {
+        pthread_mutex_lock(&cluster->folders);
+        pthread_mutex_lock(&manager->lock);
+        const bool is_wanted =
+            manager->is_closing || hashmap_find(manager->tasks, result) != NULL;
+        pthread_mutex_unlock(&manager->lock);
+        const bool is_away = !is_wanted && rename(path, away) == 0;
+        pthread_mutex_unlock(&cluster->folders);
+        if (!is_away)
+            return true;
     }
-    problem_clear(problem);
-    study_leave(&cluster->worker, run, problem);
+    if (slurm_cancel(name, false, NULL) != STATUS_OK)
+        return true;
+    chunk_folder_remove(away);
+    return false;
 }
 
+static void cluster_tidy(Cluster *cluster) {
+    const int64_t began_ns = clock_monotonic_ns();
+    const struct dirent *entry;
+    DIR *list = opendir(cluster->settings->shared);
+    bool is_left = list == NULL;
+    while (list != NULL && (entry = readdir(list)) != NULL) {
+        const char *name = entry->d_name, *id = name + sizeof prefix - 1 + RESULT_SIZE + 1;
+        if (strncmp(name, prefix, sizeof prefix - 1) == 0 &&
+            strlen(name) > sizeof prefix + RESULT_SIZE && strncmp(id, cluster->id, 8) == 0)
+            is_left = cluster_tidy_one(cluster, name) || is_left;
+    }
+    if (list != NULL)
+        (void)closedir(list);
+    const int64_t now_ns = clock_monotonic_ns(), cost_ns = now_ns - began_ns;
+    cluster->tidy_ns = is_left ? now_ns + 5 * cost_ns + seconds_ns(tidy_each) : INT64_MAX;
+}
+
+// What runs for a study goes on when the daemon ends; when the study does, it is tidied up.
 static void *cluster_main(void *context) {
     Cluster *cluster = context;
     JobManager *manager = cluster->manager;
@@ -666,22 +718,29 @@ static void *cluster_main(void *context) {
     while (!manager->is_closing || cluster->studies != NULL) {
         for (ClusterStudy **at = &cluster->studies; *at != NULL;) {
             ClusterStudy *study = *at;
-            const bool is_closing = manager->is_closing;
-            if (study_is_at_end(study) || is_closing) {
+            const bool is_over = study_is_at_end(study) || manager->is_closing;
+            if (is_over)
                 *at = study->next;
-                pthread_mutex_unlock(&manager->lock);
-                study_close(study, is_closing, &problem);
-                pthread_mutex_lock(&manager->lock);
-                at = &cluster->studies; // others may have joined meanwhile
-                continue;
-            }
             pthread_mutex_unlock(&manager->lock);
-            study_step(study, &problem);
+            problem_clear(&problem);
+            if (is_over)
+                study_leave(&cluster->worker, study->run, &problem);
+            else
+                study_step(study, &problem);
             pthread_mutex_lock(&manager->lock);
-            at = &study->next; // only this thread removes studies; new ones come before
+            // Only this thread removes studies; new ones come before.
+            at = is_over ? &cluster->studies : &study->next;
+            if (is_over)
+                cluster->tidy_ns = 0;
         }
-        const int64_t end_ns =
-            clock_monotonic_ns() + seconds_ns(cluster->studies != NULL ? scan_least : poll_most);
+        if (manager->is_closing)
+            continue;
+        pthread_mutex_unlock(&manager->lock);
+        if (clock_monotonic_ns() >= cluster->tidy_ns)
+            cluster_tidy(cluster);
+        pthread_mutex_lock(&manager->lock);
+        const bool is_idle = cluster->studies == NULL && cluster->tidy_ns == INT64_MAX;
+        const int64_t end_ns = clock_monotonic_ns() + seconds_ns(is_idle ? poll_most : scan_least);
         const struct timespec end = {(time_t)(end_ns / 1000000000), (long)(end_ns % 1000000000)};
         if (!manager->is_closing)
             (void)pthread_cond_timedwait(&manager->stopping, &manager->lock, &end);
@@ -691,9 +750,24 @@ static void *cluster_main(void *context) {
     return NULL;
 }
 
+// Servers that share a folder, or a scene, do not touch each other's.
+static void cluster_set_id(Cluster *cluster) {
+    char host[256] = "", text[PATH_MAX + 300], path[PATH_MAX], hex[65];
+    unsigned char digest[DIGEST_BYTES];
+    const char *data = cluster->settings->data != NULL ? cluster->settings->data : "";
+    (void)gethostname(host, sizeof host - 1);
+    snprintf(text, sizeof text, "%s:%s", host, realpath(data, path) != NULL ? path : data);
+    sha256_sum(text, strlen(text), digest);
+    sha256_hex(digest, hex);
+    snprintf(cluster->id, sizeof cluster->id, "%.8s", hex);
+}
+
 static void cluster_close(Cluster *cluster) {
-    if (cluster != NULL && cluster->is_started)
+    if (cluster == NULL)
+        return;
+    if (cluster->is_started)
         (void)pthread_join(cluster->thread, NULL);
+    pthread_mutex_destroy(&cluster->folders);
     free(cluster);
 }
 
@@ -714,6 +788,8 @@ Status cluster_open(JobManager *manager, Problem *problem) {
     cluster->manager = cluster->worker.manager = manager;
     cluster->settings = settings;
     cluster->facts.array_max = 1001;
+    cluster_set_id(cluster);
+    pthread_mutex_init(&cluster->folders, NULL);
     const ssize_t length =
         readlink("/proc/self/exe", cluster->program, sizeof cluster->program - 1);
     if (length <= 0)

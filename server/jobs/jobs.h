@@ -16,6 +16,7 @@ enum {
 // `shared`.
 typedef struct ClusterSettings {
     const char *shared;    // folder that all machines see; NULL: no cluster
+    const char *data;      // this server's own folder, which tells it from others
     const char *partition; // NULL: Slurm's default
     Texts options;         // further ones for sbatch; borrowed
     double seconds;

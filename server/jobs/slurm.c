@@ -55,7 +55,7 @@ Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Prob
     snprintf(name, sizeof name, "--job-name=%s", array->name);
     snprintf(tasks, sizeof tasks, "--array=%s", array->tasks);
     snprintf(time, sizeof time, "--time=%.0f", fmax(1, ceil(array->seconds / 60)));
-    snprintf(output, sizeof output, "--output=%s/log/%%a", array->folder);
+    snprintf(output, sizeof output, "--output=%s/log/%%A_%%a", array->folder);
     snprintf(start, sizeof start, "%s%s", array->folder, script);
     snprintf(partition, sizeof partition, "--partition=%s",
              settings->partition != NULL ? settings->partition : "");
@@ -107,7 +107,8 @@ static SlurmState state_of(const char *name, const char *reason) {
     for (size_t i = 0; i < COUNT(ended); i++)
         if (strcmp(name, ended[i]) == 0)
             return SLURM_ENDED;
-    if (strstr(reason, "held") != NULL || strncmp(reason, "JobHeld", 7) == 0 ||
+    // "JobHeldAdmin" is somebody's wish.
+    if (strstr(reason, "held") != NULL || strcmp(reason, "JobHoldMaxRequeue") == 0 ||
         strcmp(reason, "BadConstraints") == 0 || strcmp(name, "SPECIAL_EXIT") == 0)
         return SLURM_HELD;
     return strcmp(name, "PENDING") == 0 ? SLURM_QUEUED : SLURM_RUNNING;
@@ -126,9 +127,11 @@ static bool task_read(char *line, SlurmTask *task) {
     if (*end != '\0' || end == fields[TASK])
         return false;
     task->state = state_of(fields[STATE], fields[REASON]);
+    task->job = strtoull(fields[JOB], NULL, 10);
     task->chunk = strtoull(fields[FIRST], NULL, 10) + index;
     task->exit_code = (int)(strtoul(fields[END], NULL, 10) >> 8);
-    snprintf(task->id, sizeof task->id, "%.18s_%llu", fields[JOB], (unsigned long long)index);
+    snprintf(task->id, sizeof task->id, "%llu_%llu", (unsigned long long)task->job,
+             (unsigned long long)index);
     const bool has_reason = task->state != SLURM_ENDED && strcmp(fields[REASON], "None") != 0;
     text_fit(task->reason, sizeof task->reason, has_reason ? fields[REASON] : fields[STATE]);
     return true;

@@ -30,12 +30,12 @@ Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Prob
 typedef enum SlurmState {
     SLURM_QUEUED,
     SLURM_RUNNING,
-    SLURM_HELD, // until somebody releases it: it will not start
+    SLURM_HELD, // behind a failure: it will not start by itself
     SLURM_ENDED,
 } SlurmState;
 typedef struct SlurmTask {
-    uint64_t chunk;
-    char id[40]; // "123_4"
+    uint64_t job, chunk;
+    char id[40]; // "123_4"; the worker's words are in FOLDER/log/ID
     SlurmState state;
     int exit_code;   // of one that ended
     char reason[80]; // why it waits, or how it ended: "OUT_OF_MEMORY"
