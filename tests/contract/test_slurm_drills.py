@@ -137,7 +137,6 @@ def test_two_copies_of_each_task():
 def test_a_full_disk_that_later_has_room():
     """Nothing fits into the shared folder: the study waits, says so, and goes on when there is room; no attempt is lost."""
     with small_disk() as shared, site(shared) as at:
-        os.chmod(shared, 0o700)
         at.slurm.close_gate()
         at.begin(sweep())
         at.until(all_are_sent)
@@ -179,6 +178,8 @@ def test_a_controller_that_is_away():
             at.until_reason("contact", "answer", "connect")
             at.slurm.open_gate()
             at.slurm.start_controller()
+            # After kill -9 Slurm finds "Duplicate jobid" and drains nodes, which is for administrators to mend.
+            until(lambda: at.document()["status"] != "running" or at.slurm.resume() or time.sleep(1), at.cluster)
             at.ends_well()
 
 

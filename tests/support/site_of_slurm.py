@@ -71,6 +71,14 @@ def wanted(scene):
     return threads_answer(json.dumps(scene, sort_keys=True))
 
 
+def tasks_of(call):
+    """The tasks of a call of sbatch: of --array=0-3,7-7."""
+    (ranges,) = [word[8:] for word in call.split() if word.startswith("--array=")]
+    for one in ranges.split(","):
+        first, last = one.split("-")
+        yield from range(int(first), int(last) + 1)
+
+
 def upload(daemon):
     for seed in (1, 2):
         assert daemon.request("POST", "/v1/records", json=quake(seed)).status in (200, 201)
@@ -81,6 +89,7 @@ class Site:
 
     def __init__(self, slurm, shared, poll):
         self.slurm, self.shared, self.poll = slurm, shared, poll
+        os.chmod(shared, 0o700)
         self.data = tempfile.mkdtemp(prefix="impactd-")
         self.further = []
         self.scene = self.job = self.daemon = None
@@ -143,7 +152,7 @@ class Site:
         for name in ("4.n1.77.part", ".4", "4x", "-4", "99", "18446744073709551621", " 4", "impactd", "+4"):
             shutil.copy(files[6], os.path.join(folder, name))
 
-    def finished(self, seconds=180):
+    def finished(self, seconds=90):
         until(lambda: self.document()["status"] not in ("accepted", "running"),
               lambda: (self.document(), self.slurm.tasks("--states=all"), self.daemon.stderr()), seconds)
         return answer(self.daemon, self.document(), self.scene["study"]["kind"])
