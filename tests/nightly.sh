@@ -9,6 +9,7 @@
 #               schedules of the threads
 #   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
 #   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
+#   cluster     studies through a Slurm of three virtual nodes: what goes wrong there, its cost, its efficiency at 96 slots
 #   faults      every allocation and file call of the canonical requests and of commands fails in turn
 #   truth       the long campaigns of tests/truth
 #   storm       a million requests with killed clients and restarts, 10,000 cancels, 2,000 expensive bodies
@@ -21,7 +22,7 @@ set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 cd "$here" || exit 1
 
-all=(commit clang threads sanitized kills faults truth storm fuzz browser coverage package bench)
+all=(commit clang threads sanitized kills cluster faults truth storm fuzz browser coverage package bench)
 is_quick=
 [ "${1-}" != --quick ] || { is_quick=1 && shift; }
 parts=("${@:-${all[@]}}")
@@ -126,6 +127,15 @@ part_kills() {
     sized '--states 20 --scenes 5 --daemons 2' '--states 1500 --scenes 60 --daemons 100' "$python" tests/power/power.py --build build
     # Damaged bytes, pages, indices and logs: right answers or problems, no end of the daemon. 100 s
     sized '--copies 10' '--copies 500' "$python" tests/damage/damage.py --build build
+}
+
+part_cluster() {
+    build release
+    # Dead daemons and nodes, wrong files, full disks, a Slurm that refuses, errs or is away. 300 s
+    sized killed_before '' "$python" tests/contract/test_slurm_drills.py --build build
+    # 1e6 scenes end to end. 900 s
+    sized '--scenes 3000' '--scenes 1000000 --duration 10' "$python" tests/bench/bench_slurm.py --build build
+    check "$python" tests/bench/efficiency.py
 }
 
 part_faults() {

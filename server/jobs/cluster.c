@@ -27,12 +27,12 @@ enum {
     RESULT_SIZE = 66, // of a result's id
 };
 static const char prefix[] = "impactd-", gone[] = ".gone"; // of the name of a study, after it
-static const double scan_least = 0.2, scan_most = 2; // [s] between looks at the folder
-static const double poll_most = 60;                  // [s] between questions to Slurm
-static const double facts_each = 5;                  // [s]
-static const double tidy_each = 1;                   // [s]
-static const double chunk_target = 60;               // [s] of CPU
-static const double audit_share = 0.02;              // of the time since the study began
+static const double scan_least = 0.2, scan_most = 2;       // [s] between looks at the folder
+static const double poll_most = 60;                        // [s] between questions to Slurm
+static const double facts_each = 5;                        // [s]
+static const double tidy_each = 1;                         // [s]
+static const double chunk_target = 60;                     // [s] of CPU
+static const double audit_share = 0.02;                    // of the time since the study began
 
 typedef enum ChunkState { CHUNK_TO_DO, CHUNK_SUBMITTED, CHUNK_DONE } ChunkState;
 
@@ -52,10 +52,11 @@ typedef struct ClusterStudy {
     char name[NAME_SIZE]; // of its folder, and of its jobs
     char folder[PATH_MAX];
     ClusterChunk *chunks;
-    size_t first;  // all before it are done
-    size_t window; // tasks that Slurm takes at once, as far as is known
-    bool is_known; // Slurm told what it has since the start
-    bool is_full;  // there was no space for a chunk
+    size_t first;   // all before it are done
+    size_t window;  // tasks that Slurm takes at once, as far as is known
+    bool is_known;  // Slurm told what it has since the start
+    bool is_full;   // there was no space for a chunk
+    bool is_probed; // of late, whether there is
     int64_t began_ns, scan_ns, poll_ns, submit_ns;
     double scan_pause, poll_pause, submit_pause, audit_seconds;
     // Under the manager's lock:
@@ -464,10 +465,11 @@ static void chunk_ended(ClusterStudy *study, size_t chunk, const SlurmTask *task
         return;
     }
     // Without space Slurm cannot even begin a task.
-    const bool was_full = study->is_full;
-    study->is_full = true;
-    const bool has_space = study_has_space(study);
-    study->is_full = was_full || !has_space || code == CHUNK_FULL;
+    if (!study->is_probed && !study->is_full) {
+        study->is_full = study->is_probed = true;
+        (void)study_has_space(study);
+    }
+    study->is_full = study->is_full || code == CHUNK_FULL;
     snprintf(path, sizeof path, "%.3000s/chunks/%zu", study->folder, chunk);
     if (access(path, F_OK) == 0) {
         of->has_file = true;
@@ -514,6 +516,7 @@ static void study_apply_tasks(ClusterStudy *study, const SlurmTasks *tasks, Prob
     }
     const bool is_seen = study_look(study);
     bool is_same = true;
+    study->is_probed = false;
     for (size_t i = study->first; is_seen && last != NULL && i < study->plan.chunks; i++) {
         const ClusterChunk *chunk = &study->chunks[i];
         if (chunk->state == CHUNK_SUBMITTED && !chunk->is_live && !chunk->has_file) {
@@ -677,8 +680,7 @@ static bool cluster_tidy_one(Cluster *cluster, const char *entry) {
     if (end == NULL) {
         pthread_mutex_lock(&cluster->folders);
         pthread_mutex_lock(&manager->lock);
-        const bool is_wanted =
-            manager->is_closing || hashmap_find(manager->tasks, result) != NULL;
+        const bool is_wanted = manager->is_closing || hashmap_find(manager->tasks, result) != NULL;
         pthread_mutex_unlock(&manager->lock);
         const bool is_away = !is_wanted && rename(path, away) == 0;
         pthread_mutex_unlock(&cluster->folders);

@@ -126,14 +126,14 @@ class Site:
         self.daemon.kill()
         self.daemon = None
 
-    def chunks(self):
-        """The folder of the study's chunks."""
-        (study,) = [entry.path for entry in os.scandir(self.shared) if entry.is_dir()]
-        return os.path.join(study, "chunks")
+    def name(self):
+        """Of the study's folder and of its jobs."""
+        (name,) = [entry.name for entry in os.scandir(self.shared) if entry.is_dir()]
+        return name
 
     def spoil(self):
         """Chunks 0 to 4 of 12 are torn, damaged, another chunk's, another study's, away; files of odd names lie beside them."""
-        folder = self.chunks()
+        folder = os.path.join(self.shared, self.name(), "chunks")
         files = [os.path.join(folder, str(i)) for i in range(12)]
         with open(files[0], "r+b") as file:
             file.truncate(os.path.getsize(files[0]) // 2)
