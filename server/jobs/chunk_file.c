@@ -380,7 +380,8 @@ static const char *chunk_fault(const ChunkPlan *plan, const ChunkKey *key, size_
     file->bytes.count = end;
     for (file->at = sizeof head; chunk_next(file, &part, &size);)
         count++;
-    if (file->at != end || count != head.count || count != chunk_plan_count(plan, chunk))
+    if (file->at != end || count == 0 || count != head.count ||
+        count != chunk_plan_count(plan, chunk))
         return "has other members";
     file->at = sizeof head;
     return NULL;

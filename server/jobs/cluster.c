@@ -52,11 +52,12 @@ typedef struct ClusterStudy {
     char name[NAME_SIZE]; // of its folder, and of its jobs
     char folder[PATH_MAX];
     ClusterChunk *chunks;
-    size_t first;   // all before it are done
-    size_t window;  // tasks that Slurm takes at once, as far as is known
-    bool is_known;  // Slurm told what it has since the start
-    bool is_full;   // there was no space for a chunk
-    bool is_probed; // of late, whether there is
+    size_t first;    // all before it are done
+    double patience; // times the predicted time of a chunk, that are asked for it
+    size_t window;   // tasks that Slurm takes at once, as far as is known
+    bool is_known;   // Slurm told what it has since the start
+    bool is_full;    // there was no space for a chunk
+    bool is_probed;  // of late, whether there is
     int64_t began_ns, scan_ns, poll_ns, submit_ns;
     double scan_pause, poll_pause, submit_pause, audit_seconds;
     // Under the manager's lock:
@@ -175,6 +176,7 @@ static Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem)
     *study = (ClusterStudy){.cluster = cluster,
                             .run = run,
                             .window = WINDOW_MOST,
+                            .patience = 3,
                             .began_ns = clock_monotonic_ns(),
                             .scan_pause = scan_least,
                             .poll_pause = poll,
@@ -251,23 +253,21 @@ static bool study_has_time_to_audit(const ClusterStudy *study) {
 }
 
 // Why the parts cannot be those of the chunk; NULL: they can.
-static const char *chunk_audit(ClusterStudy *study, size_t chunk, ChunkFile *file) {
-    const ChunkFile begin = *file;
-    const size_t count = chunk_plan_count(&study->plan, chunk), audited = (chunk * 7919) % count;
-    const char *bytes, *fault = NULL;
-    size_t size;
-    for (size_t place = 0; fault == NULL && chunk_next(file, &bytes, &size); place++) {
-        StudyPart *part = part_blob_read(study->run->work, bytes, size);
-        if (part == NULL)
-            fault = "has a part that cannot be read";
-        else if (place == audited && part->run.status == STATUS_OK &&
-                 study_has_time_to_audit(study) && !chunk_is_ours(study, chunk, place, bytes, size))
-            fault = "has other digits than this machine computes: give the cluster's machines the "
-                    "same impactd, or choose others by --sbatch-option";
-        study_part_free(study->run->work, part);
-    }
-    *file = begin;
-    return fault;
+static const char *chunk_audit(ClusterStudy *study, size_t chunk, ChunkFile file) {
+    const size_t place = (chunk * 7919) % chunk_plan_count(&study->plan, chunk);
+    const char *bytes = NULL;
+    size_t size = 0;
+    if (!study_has_time_to_audit(study))
+        return NULL;
+    for (size_t i = 0; i <= place; i++)
+        (void)chunk_next(&file, &bytes, &size);
+    StudyPart *part = part_blob_read(study->run->work, bytes, size);
+    const bool is_ours = part == NULL || part->run.status != STATUS_OK ||
+                         chunk_is_ours(study, chunk, place, bytes, size);
+    study_part_free(study->run->work, part);
+    return is_ours ? NULL
+                   : "has other digits than this machine computes: give the cluster's machines the "
+                     "same impactd, or choose others by --sbatch-option";
 }
 
 static Status chunk_fold(ClusterStudy *study, size_t chunk, ChunkFile *file, Problem *problem) {
@@ -279,18 +279,17 @@ static Status chunk_fold(ClusterStudy *study, size_t chunk, ChunkFile *file, Pro
     if (run->is_sweep)
         TRY(sweep_chunk_restart(run, of->rows, problem));
     for (size_t place = 0; status == STATUS_OK && chunk_next(file, &bytes, &size); place++) {
+        const size_t member = chunk_plan_member(&study->plan, chunk, place);
         StudyPart *part = part_blob_read(run->work, bytes, size);
         if (part == NULL)
-            return study_result(STATUS_NO_MEMORY, problem);
-        if (!run->is_sweep) {
-            if (atomic_load(&run->engine.is_over))
-                study_part_free(run->work, part);
-            else
-                status = study_engine_fold(
-                    &run->engine, chunk_plan_member(&study->plan, chunk, place), part, problem);
+            return problem_set(problem, STATUS_INVALID, "chunk %zu cannot be read", chunk);
+        // What was folded before a failure stays.
+        if (!run->is_sweep && !atomic_load(&run->engine.is_over) && member >= run->engine.folded) {
+            status = study_engine_fold(&run->engine, member, part, problem);
             continue;
         }
-        sweep_chunk_put(run, of->rows, part);
+        if (run->is_sweep)
+            sweep_chunk_put(run, of->rows, part);
         study_part_free(run->work, part);
     }
     if (status == STATUS_OK && run->is_sweep)
@@ -330,7 +329,8 @@ static void chunk_is_lost(ClusterStudy *study, size_t chunk, bool is_final, cons
     of->has_file = of->was_missing = false;
     study->submit_ns = 0;
     study_explain(study, copy);
-    if (++of->attempts >= ATTEMPTS || is_final)
+    study->patience = fmax(study->patience, 3 * exp2(++of->attempts)); // it may have been slow
+    if (of->attempts >= ATTEMPTS || is_final)
         chunk_give_up(study, chunk, copy, problem);
 }
 
@@ -343,7 +343,7 @@ static Status chunk_ingest(ClusterStudy *study, size_t chunk, Problem *problem) 
     ChunkFile file;
     snprintf(path, sizeof path, "%.3000s/chunks/%zu", study->folder, chunk);
     Status status = chunk_read(study->folder, &study->plan, &study->key, chunk, &file, problem);
-    const char *fault = status == STATUS_OK ? chunk_audit(study, chunk, &file) : NULL;
+    const char *fault = status == STATUS_OK ? chunk_audit(study, chunk, file) : NULL;
     if (fault != NULL)
         status = problem_set(problem, STATUS_INVALID, "chunk %zu %s", chunk, fault);
     if (status == STATUS_OK)
@@ -621,7 +621,7 @@ static void study_submit(ClusterStudy *study, Problem *problem) {
                                   .program = cluster->program,
                                   .tasks = tasks.at,
                                   .first = first,
-                                  .seconds = 3 * seconds};
+                                  .seconds = study->patience * seconds};
         Status status = STATUS_OK;
         if (count > 0)
             status = tasks.is_failed ? STATUS_NO_MEMORY : slurm_submit(&slurm, &array, problem);

@@ -10,7 +10,8 @@
 #include "server/util/subprocess.h"
 
 enum { OUTPUT_BYTES = 64 << 20, ARGUMENTS = 64 };
-static const double patience = 20; // [s] for an answer
+static const double patience = 20;     // [s] for an answer
+static const double least_minutes = 5; // asked for a task: nodes may be busy
 
 // sbatch takes scripts alone; this one becomes the program.
 static const char script[] = "/start",
@@ -54,7 +55,7 @@ Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Prob
     Words words = {.count = 0};
     snprintf(name, sizeof name, "--job-name=%s", array->name);
     snprintf(tasks, sizeof tasks, "--array=%s", array->tasks);
-    snprintf(time, sizeof time, "--time=%.0f", fmax(1, ceil(array->seconds / 60)));
+    snprintf(time, sizeof time, "--time=%.0f", fmax(least_minutes, ceil(array->seconds / 60)));
     snprintf(output, sizeof output, "--output=%s/log/%%A_%%a", array->folder);
     snprintf(start, sizeof start, "%s%s", array->folder, script);
     snprintf(partition, sizeof partition, "--partition=%s",
