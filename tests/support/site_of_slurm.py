@@ -194,7 +194,10 @@ def site(shared=None, poll=0.3, array=1001):
     finally:
         made.close()
         slurm.unwrap()
-        slurm.restore()
+        if slurm.is_spoiled:
+            slurms.pop(array).__exit__()
+        else:
+            slurm.restore()
         if shared is None:
             shutil.rmtree(folder, ignore_errors=True)
 

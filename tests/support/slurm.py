@@ -120,6 +120,7 @@ class Slurm:
         self.gate_path = os.path.join(self.bin, "gate.impactd")
         self.gate = f"arguments[-5] = {self.gate_path!r}"  # for a wrapper of sbatch
         self.daemons = {}
+        self.is_spoiled = False
         os.mkdir(self.bin)
         os.mkdir(os.path.join(self.folder, "state"))
         with open(os.open(self._path("munge.key"), os.O_WRONLY | os.O_CREAT, 0o600), "wb") as key:
@@ -172,6 +173,8 @@ class Slurm:
 
     def end(self, name, how=signal.SIGTERM):
         """Ends slurmctld, a node or munge."""
+        # It forgets jobs then and gives their numbers again, which the nodes refuse.
+        self.is_spoiled = self.is_spoiled or (name == "slurmctld" and how == signal.SIGKILL)
         process = self.daemons.pop(name)
         process.send_signal(how)
         try:
