@@ -28,7 +28,7 @@ def sweep(points=120, duration=3):
 def slow_sweep(points=12):
     """Each member takes some tenths of a second."""
     made = sweep(points)
-    made.update(duration=20, sample_rate=100, accuracy={"solver": "rk4", "step": 1e-5})
+    made.update(duration=8, sample_rate=100, accuracy={"solver": "rk4", "step": 1e-5})
     return made
 
 
