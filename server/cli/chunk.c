@@ -46,30 +46,8 @@ static void chunk_stop(int signal) {
     _exit(CHUNK_AGAIN);
 }
 
-static bool pipe_write(int pipe, const void *data, size_t size) {
-    for (const char *at = data; size > 0;) {
-        const ssize_t count = write(pipe, at, size);
-        if (count < 0 && errno != EINTR)
-            return false;
-        at += count > 0 ? count : 0;
-        size -= count > 0 ? (size_t)count : 0;
-    }
-    return true;
-}
-
-static bool pipe_read(int pipe, void *data, size_t size) {
-    for (char *at = data; size > 0;) {
-        const ssize_t count = read(pipe, at, size);
-        if (count == 0 || (count < 0 && errno != EINTR))
-            return false;
-        at += count > 0 ? count : 0;
-        size -= count > 0 ? (size_t)count : 0;
-    }
-    return true;
-}
-
 // The child: makes the members from `made` on and writes them to the pipe. Returns its exit code.
-static int chunk_make_members(const ChunkMaking *making, int pipe) {
+static int chunk_make_members(const ChunkMaking *making, FILE *pipe) {
     const SimulationLimits limits = chunk_plan_limits(&making->plan);
     Workspace workspace = {0};
     const StudyTools tools = {.limits = &limits, .workspace = &workspace};
@@ -85,8 +63,8 @@ static int chunk_make_members(const ChunkMaking *making, int pipe) {
         }
         part_blob_write(&bytes, part);
         const uint64_t size = bytes.count;
-        if (bytes.is_failed || !pipe_write(pipe, &size, sizeof size) ||
-            !pipe_write(pipe, bytes.at, bytes.count))
+        if (bytes.is_failed || fwrite(&size, sizeof size, 1, pipe) != 1 ||
+            fwrite(bytes.at, 1, bytes.count, pipe) != bytes.count || fflush(pipe) != 0)
             return CHUNK_AGAIN;
         bytes_clear(&bytes);
         study_part_free(making->work, part);
@@ -95,11 +73,11 @@ static int chunk_make_members(const ChunkMaking *making, int pipe) {
 }
 
 // Takes what the child writes, member by member; of one that it did not write whole, nothing.
-static void chunk_take_members(ChunkMaking *making, int pipe) {
+static void chunk_take_members(ChunkMaking *making, FILE *pipe) {
     uint64_t size;
-    while (making->made < making->count && pipe_read(pipe, &size, sizeof size)) {
+    while (making->made < making->count && fread(&size, sizeof size, 1, pipe) == 1) {
         char *part = malloc((size_t)size + 1);
-        const bool is_whole = part != NULL && pipe_read(pipe, part, (size_t)size);
+        const bool is_whole = part != NULL && fread(part, 1, (size_t)size, pipe) == size;
         if (is_whole) {
             chunk_add(&making->bytes, part, (size_t)size);
             making->made++;
@@ -136,17 +114,20 @@ static int chunk_run_child(ChunkMaking *making) {
     int ends[2], state;
     if (pipe(ends) != 0)
         return CHUNK_AGAIN;
-    const pid_t child = fork();
+    FILE *in = fdopen(ends[0], "r"), *out = fdopen(ends[1], "w");
+    const pid_t child = in != NULL && out != NULL ? fork() : -1;
     if (child == 0) {
         (void)signal(SIGTERM, SIG_DFL);
-        (void)close(ends[0]);
-        _exit(chunk_make_members(making, ends[1]));
+        (void)fclose(in);
+        _exit(chunk_make_members(making, out));
     }
     chunk_child = (sig_atomic_t)child;
-    (void)close(ends[1]);
+    if (out != NULL)
+        (void)fclose(out);
     if (child > 0)
-        chunk_take_members(making, ends[0]);
-    (void)close(ends[0]);
+        chunk_take_members(making, in);
+    if (in != NULL)
+        (void)fclose(in);
     while (child > 0 && waitpid(child, &state, 0) < 0 && errno == EINTR)
         ;
     chunk_child = 0;
@@ -166,7 +147,7 @@ static int chunk_open(ChunkMaking *making, Problem *problem) {
     Status status =
         chunk_folder_read(making->folder, &making->plan, &making->key, &making->request, problem);
     if (status != STATUS_OK)
-        return status == STATUS_IO || status == STATUS_NO_MEMORY ? CHUNK_AGAIN : CHUNK_BAD;
+        return status == STATUS_INVALID ? CHUNK_BAD : CHUNK_AGAIN;
     if (making->request.study == NULL || making->chunk >= making->plan.chunks) {
         (void)problem_set(problem, STATUS_INVALID, "there is no chunk %zu", making->chunk);
         return CHUNK_BAD;
