@@ -557,7 +557,7 @@ static void study_poll(ClusterStudy *study, Problem *problem) {
     free(tasks.at);
     const int64_t now_ns = clock_monotonic_ns();
     const double cost = 1e-9 * (double)(now_ns - began_ns);
-    study->poll_ns = now_ns + seconds_ns(fmax(study->poll_pause, 5 * cost));
+    study->poll_ns = now_ns + seconds_ns(fmax(study->poll_pause, fmin(5 * cost, poll_most)));
 }
 
 // --- what is sent ---

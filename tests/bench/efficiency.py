@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """efficiency.py: how much of a large cluster's time a sweep uses, simulated from what was measured.
 
-The chunks are cut as server/jobs/study.c and cluster.c cut them. Slurm starts tasks at a rate and with a delay that were
+The chunks are cut as server/jobs/study.c cuts those of a sweep. Slurm starts tasks at a rate and with a delay that were
 measured with a real one (2 busy cores: a cluster's is not slower); the daemon takes files one by one, as bench_slurm.py
 measures it. Scenes differ in cost: chunks, being strided, vary little. Prints a table and judges 1e8 scenes on 96 slots."""
 
@@ -10,11 +10,11 @@ import math
 import random
 import sys
 
-CHUNKS_MAX, CHUNK_ROWS, CHUNKS_PER_SLOT, CHUNK_SECONDS, WINDOW = 4096, 1 << 16, 4, 60, 4096
+CHUNKS_MAX, CHUNK_ROWS, CHUNKS_PER_SLOT, CHUNK_SECONDS = 4096, 1 << 16, 4, 60
 # Of Slurm: tasks started in a second, the delay of a start [s]: as it comes, and told to schedule at once.
 RATES = {"Slurm as it comes": (2.9, 2.97), "told to schedule at once": (13.4, 0.97)}
 # [s]: a task's own start, a row's way into the database, the daemon's look at the folder.
-START, ROW, SCAN = 0.3, 23.3e-6, 2.0
+START, ROW, SCAN = 0.15, 1.2e-6, 2.0
 DEVIATION = 0.03  # of the time of a chunk
 
 
@@ -25,7 +25,7 @@ def count_chunks(scenes, slots, seconds):
 
 
 def simulate(scenes, slots, scene, rate, delay, seed=1):
-    """(chunks, efficiency, seconds of the daemon): the share of the slots' time that is spent in scenes."""
+    """(chunks, efficiency): the share of the slots' time that is spent in scenes."""
     chance = random.Random(seed)
     chunks = count_chunks(scenes, slots, scenes * scene)
     costs = [scenes / chunks * scene * chance.gauss(1, DEVIATION) for _ in range(chunks)]
@@ -37,7 +37,7 @@ def simulate(scenes, slots, scene, rate, delay, seed=1):
         heapq.heappush(free, end)
         taken = max(taken, end) + scenes / chunks * ROW
     wall = max(max(free) + SCAN, taken)
-    return chunks, sum(costs) / (slots * wall), scenes * ROW
+    return chunks, sum(costs) / (slots * wall)
 
 
 def main():
@@ -46,7 +46,7 @@ def main():
     for name, (rate, delay) in RATES.items():
         for scenes in (10**6, 10**7, 10**8):
             for slots in (24, 96, 384):
-                chunks, share, _ = simulate(scenes, slots, 1e-3, rate, delay)
+                chunks, share = simulate(scenes, slots, 1e-3, rate, delay)
                 print(f"{scenes:8.0e} {slots:6d} {chunks:7d} {share:11.1%}  {name}")
                 if scenes == 10**8 and slots == 96:
                     least = min(least, share)

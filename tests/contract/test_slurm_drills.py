@@ -19,7 +19,7 @@ IN_QUEUE = "subprocess.run(['squeue', '-h', '-r'], capture_output=True, text=Tru
 
 
 def all_are_sent(cluster):
-    return cluster["running"] + cluster["queued"] == 12
+    return cluster["chunks"] > 0 and cluster["running"] + cluster["queued"] == cluster["chunks"]
 
 
 def until_dead(at):

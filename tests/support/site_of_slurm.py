@@ -152,7 +152,7 @@ class Site:
         for name in ("4.n1.77.part", ".4", "4x", "-4", "99", "18446744073709551621", " 4", "impactd", "+4"):
             shutil.copy(files[6], os.path.join(folder, name))
 
-    def finished(self, seconds=90):
+    def finished(self, seconds=180):
         until(lambda: self.document()["status"] not in ("accepted", "running"),
               lambda: (self.document(), self.slurm.tasks("--states=all"), self.daemon.stderr()), seconds)
         return answer(self.daemon, self.document(), self.scene["study"]["kind"])
