@@ -33,7 +33,7 @@ enum {
 };
 // Short chunks let rows appear soon, and little is lost when the daemon is killed. On a cluster
 // each has costs of its own.
-static const double chunk_seconds = 0.25, cluster_chunk_seconds = 60;
+static const double chunk_seconds = 0.25, cluster_chunk_seconds = 120;
 
 static Status study_no_memory(Problem *problem) {
     return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
@@ -206,6 +206,7 @@ static size_t sweep_count_chunks(size_t points, size_t slots, double seconds, do
     double chunks = fmin(ceil(seconds / each), CHUNKS_MAX);
     chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
     chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * slots));
+    chunks = ceil(chunks / (double)slots) * (double)slots; // all slots are busy to the end
     return (size_t)fmin(chunks, all);
 }
 

@@ -10,7 +10,7 @@ import math
 import random
 import sys
 
-CHUNKS_MAX, CHUNK_ROWS, CHUNKS_PER_SLOT, CHUNK_SECONDS = 4096, 1 << 16, 4, 60
+CHUNKS_MAX, CHUNK_ROWS, CHUNKS_PER_SLOT, CHUNK_SECONDS = 4096, 1 << 16, 4, 120
 # Of Slurm: tasks started in a second, the delay of a start [s]: as it comes, and told to schedule at once.
 RATES = {"Slurm as it comes": (2.9, 2.97), "told to schedule at once": (13.4, 0.97)}
 # [s]: a task's own start, a row's way into the database, the daemon's look at the folder.
@@ -21,7 +21,8 @@ DEVIATION = 0.03  # of the time of a chunk
 def count_chunks(scenes, slots, seconds):
     """sweep_count_chunks."""
     chunks = min(math.ceil(seconds / CHUNK_SECONDS), CHUNKS_MAX)
-    return min(max(chunks, math.ceil(scenes / CHUNK_ROWS), CHUNKS_PER_SLOT * slots), scenes)
+    chunks = max(chunks, math.ceil(scenes / CHUNK_ROWS), CHUNKS_PER_SLOT * slots)
+    return min(math.ceil(chunks / slots) * slots, scenes)
 
 
 def simulate(scenes, slots, scene, rate, delay, seed=1):
