@@ -147,7 +147,7 @@ typedef struct ClusterStudy ClusterStudy;
 typedef struct StudyExecutor {
     // Whether it makes the members of a study of this kind and predicted CPU time.
     bool (*wants)(const Cluster *cluster, const StudyKind *kind, double seconds);
-    size_t (*slots)(const Cluster *cluster); // runs at once; a guess while that is not known
+    size_t (*slots)(Cluster *cluster); // runs at once; a guess while that is not known
     // Prepares a begun study, of a sweep with its chunks. STATUS_FULL, STATUS_IO: not now.
     Status (*prepare)(Cluster *cluster, struct StudyRun *run, Problem *problem);
     // With the manager's lock held, as the next: takes a prepared study, with a turn of it, to its
