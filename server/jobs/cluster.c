@@ -196,12 +196,12 @@ static Status cluster_prepare(Cluster *cluster, StudyRun *run, Problem *problem)
     if (run->is_sweep)
         for (size_t i = 0; i < study->plan.chunks; i++)
             study->chunks[i].state = CHUNK_DONE; // unless it is to be made
+    study->done = run->is_sweep ? study->plan.chunks : 0;
     for (SweepChunk *rows; (rows = run->chunks) != NULL;) {
         run->chunks = rows->next;
         study->chunks[rows->row.chunk] = (ClusterChunk){.rows = rows, .state = CHUNK_TO_DO};
+        study->done--;
     }
-    for (size_t i = 0; i < study->plan.chunks; i++)
-        study->done += study->chunks[i].state == CHUNK_DONE;
     return slurm_make_start(study->folder, problem);
 }
 
@@ -225,49 +225,36 @@ static void cluster_view(const ClusterStudy *study, ClusterView *view) {
 // --- files that came back ---
 
 // Makes one of the members here and compares the bytes: a node that computes other digits would
-// give results that depend on where they were made. A run that failed is not tried.
-static bool chunk_is_ours(ClusterStudy *study, size_t chunk, size_t place, const char *bytes,
-                          size_t size) {
+// give results that depend on where they were made. Not of a run that failed, and only while this
+// takes little of the time.
+static bool chunk_is_ours(ClusterStudy *study, size_t chunk, ChunkFile file) {
     StudyWork *work = study->run->work;
     const StudyTools tools = {.limits = work->limits,
                               .workspace = &study->cluster->worker.workspace};
+    const size_t place = (chunk * 7919) % chunk_plan_count(&study->plan, chunk);
+    const size_t member = chunk_plan_member(&study->plan, chunk, place);
     const int64_t began_ns = clock_thread_cpu_ns();
-    StudyPart *part = NULL;
+    const char *bytes = NULL;
+    size_t size = 0;
     Bytes own = {0};
     Problem problem = {.status = STATUS_OK};
-    const size_t member = chunk_plan_member(&study->plan, chunk, place);
-    bool is_same = true;
-    if (study_part_make(work, member, &tools, &part, &problem) == STATUS_OK) {
-        part_blob_write(&own, part);
+    if (study->audit_seconds >
+        audit_share * 1e-9 * (double)(clock_monotonic_ns() - study->began_ns))
+        return true;
+    for (size_t i = 0; i <= place; i++)
+        (void)chunk_next(&file, &bytes, &size);
+    StudyPart *theirs = part_blob_read(work, bytes, size), *ours = NULL;
+    bool is_same = theirs == NULL || theirs->run.status != STATUS_OK ||
+                   study_part_make(work, member, &tools, &ours, &problem) != STATUS_OK;
+    if (!is_same) {
+        part_blob_write(&own, ours);
         is_same = own.is_failed || (own.count == size && memcmp(own.at, bytes, size) == 0);
     }
-    study_part_free(work, part);
+    study_part_free(work, theirs);
+    study_part_free(work, ours);
     bytes_clear(&own);
     study->audit_seconds += 1e-9 * (double)(clock_thread_cpu_ns() - began_ns);
     return is_same;
-}
-
-static bool study_has_time_to_audit(const ClusterStudy *study) {
-    const double passed = 1e-9 * (double)(clock_monotonic_ns() - study->began_ns);
-    return study->audit_seconds <= audit_share * passed;
-}
-
-// Why the parts cannot be those of the chunk; NULL: they can.
-static const char *chunk_audit(ClusterStudy *study, size_t chunk, ChunkFile file) {
-    const size_t place = (chunk * 7919) % chunk_plan_count(&study->plan, chunk);
-    const char *bytes = NULL;
-    size_t size = 0;
-    if (!study_has_time_to_audit(study))
-        return NULL;
-    for (size_t i = 0; i <= place; i++)
-        (void)chunk_next(&file, &bytes, &size);
-    StudyPart *part = part_blob_read(study->run->work, bytes, size);
-    const bool is_ours = part == NULL || part->run.status != STATUS_OK ||
-                         chunk_is_ours(study, chunk, place, bytes, size);
-    study_part_free(study->run->work, part);
-    return is_ours ? NULL
-                   : "has other digits than this machine computes: give the cluster's machines the "
-                     "same impactd, or choose others by --sbatch-option";
 }
 
 static Status chunk_fold(ClusterStudy *study, size_t chunk, ChunkFile *file, Problem *problem) {
@@ -292,13 +279,12 @@ static Status chunk_fold(ClusterStudy *study, size_t chunk, ChunkFile *file, Pro
             sweep_chunk_put(run, of->rows, part);
         study_part_free(run->work, part);
     }
-    if (status == STATUS_OK && run->is_sweep)
-        status = sweep_chunk_save(run, of->rows, problem);
-    if (status == STATUS_OK && run->is_sweep) {
-        run->rows_made += of->rows->count;
-        run->rows_failed += (size_t)of->rows->row.failed;
-    }
-    return status;
+    if (status != STATUS_OK || !run->is_sweep)
+        return status;
+    TRY(sweep_chunk_save(run, of->rows, problem));
+    run->rows_made += of->rows->count;
+    run->rows_failed += (size_t)of->rows->row.failed;
+    return STATUS_OK;
 }
 
 // No machine can make the chunk: its members are runs that failed.
@@ -343,9 +329,12 @@ static Status chunk_ingest(ClusterStudy *study, size_t chunk, Problem *problem) 
     ChunkFile file;
     snprintf(path, sizeof path, "%.3000s/chunks/%zu", study->folder, chunk);
     Status status = chunk_read(study->folder, &study->plan, &study->key, chunk, &file, problem);
-    const char *fault = status == STATUS_OK ? chunk_audit(study, chunk, file) : NULL;
-    if (fault != NULL)
-        status = problem_set(problem, STATUS_INVALID, "chunk %zu %s", chunk, fault);
+    if (status == STATUS_OK && !chunk_is_ours(study, chunk, file))
+        status = problem_set(problem, STATUS_INVALID,
+                             "chunk %zu has other digits than this machine computes: give the "
+                             "cluster's machines the same impactd, or choose others by "
+                             "--sbatch-option",
+                             chunk);
     if (status == STATUS_OK)
         status = chunk_fold(study, chunk, &file, problem);
     bytes_clear(&file.bytes);
@@ -687,10 +676,16 @@ static bool cluster_tidy_one(Cluster *cluster, const char *entry) {
         if (!is_away)
             return true;
     }
-    if (slurm_cancel(name, false, NULL) != STATUS_OK)
-        return true;
-    chunk_folder_remove(away);
-    return false;
+    SlurmTasks tasks = {NULL, 0};
+    bool is_left = slurm_cancel(name, false, NULL) != STATUS_OK ||
+                   slurm_tasks(name, &tasks, NULL) != STATUS_OK;
+    // One that was about to start may have escaped.
+    for (size_t i = 0; i < tasks.count; i++)
+        is_left = is_left || tasks.at[i].state != SLURM_ENDED;
+    free(tasks.at);
+    if (!is_left)
+        chunk_folder_remove(away);
+    return is_left;
 }
 
 static void cluster_tidy(Cluster *cluster) {
