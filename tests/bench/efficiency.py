@@ -14,7 +14,7 @@ CHUNKS_MAX, CHUNK_ROWS, CHUNKS_PER_SLOT, CHUNK_SECONDS = 4096, 1 << 16, 4, 120
 # Of Slurm: tasks started in a second, the delay of a start [s]: as it comes, and told to schedule at once.
 RATES = {"Slurm as it comes": (2.9, 2.97), "told to schedule at once": (13.4, 0.97)}
 # [s]: a task's own start, a row's way into the database, the daemon's look at the folder.
-START, ROW, SCAN = 0.15, 1.2e-6, 2.0
+START, ROW, SCAN = 0.15, 1.5e-6, 2.0
 DEVIATION = 0.03  # of the time of a chunk
 
 
