@@ -7,7 +7,7 @@
 #   clang       the program and its tests as clang compiles them, without a warning
 #   threads     the thread sanitizer: unit tests of jobs, db and http, requests, cancels, SIGHUP, ends and faults; random
 #               schedules of the threads
-#   sanitized   the other tests of the program with the address and undefined-behaviour sanitizers
+#   sanitized   unit tests and the other tests of the program with the address and undefined-behaviour sanitizers
 #   kills       kill -9 amid jobs, sweeps and imports, full disks, power failures, damaged databases
 #   cluster     studies through a Slurm of three virtual nodes: what goes wrong there, its cost, its efficiency at 96 slots
 #   faults      every allocation and file call of the canonical requests and of commands fails in turn
@@ -113,6 +113,7 @@ part_threads() {
 
 part_sanitized() {
     build debug
+    ctests debug ^unit/core/base
     marked build-debug 'SANITIZED = "nightly"'
 }
 
