@@ -338,7 +338,12 @@ static Status chunk_ingest(ClusterStudy *study, size_t chunk, Problem *problem) 
     if (status == STATUS_OK)
         status = chunk_fold(study, chunk, &file, problem);
     bytes_clear(&file.bytes);
-    if (status == STATUS_NOT_FOUND || status == STATUS_INVALID) {
+    if (status ==
+        STATUS_NOT_FOUND) { // it was there a moment ago; Slurm says what became of its task
+        of->has_file = false;
+        return STATUS_OK;
+    }
+    if (status == STATUS_INVALID) {
         (void)unlink(path);
         chunk_is_lost(study, chunk, false, problem->detail, problem);
         return STATUS_OK;
@@ -366,8 +371,9 @@ static bool study_look(ClusterStudy *study) {
     if (list == NULL)
         return false;
     while ((entry = readdir(list)) != NULL) {
+        const bool is_number = entry->d_name[0] >= '0' && entry->d_name[0] <= '9';
         const unsigned long chunk = strtoul(entry->d_name, &end, 10);
-        if (end != entry->d_name && *end == '\0' && chunk < study->plan.chunks)
+        if (is_number && *end == '\0' && chunk < study->plan.chunks)
             study->chunks[chunk].has_file = true;
     }
     (void)closedir(list);

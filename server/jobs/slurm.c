@@ -71,6 +71,7 @@ Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Prob
                                  output,
                                  comment,
                                  "--requeue",
+                                 "--export=NIL",
                                  "--open-mode=append",
                                  "--signal=B:TERM@30",
                                  "--ntasks=1",
