@@ -125,9 +125,13 @@ test("A frame is saved as PNG, a window as WebM, which shows its progress and ca
     await new Promise((resolve) => setTimeout(resolve, 50));
     node.click();
   });
-  assert.ok(await cancel.evaluate((node) => node === document.activeElement), "the button keeps the focus");
-  await page.waitForTimeout(800);
-  await cancel.click();
+  const hasFocus = await cancel.evaluate(async (node) => { // likewise: a slow page may be told too late
+    const isActive = node === document.activeElement;
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    node.click();
+    return isActive;
+  });
+  assert.ok(hasFocus, "the button keeps the focus");
   await player(page).getByRole("button", { name: /Save as WebM/ }).waitFor();
 });
 
