@@ -56,8 +56,10 @@ async function send(method, path, { json, body, type, headers, query, signal }) 
 }
 
 let pageSignal = null; // aborted when the page in view is left
+let declined; // the token, or that there is none, about which this page's reader was asked in vain
 export function setPageSignal(signal) {
   pageSignal = signal;
+  declined = undefined;
 }
 
 // One exchange; a Refusal where the answer is none. Options: json (a body), body and type (another one), headers, query
@@ -65,8 +67,12 @@ export function setPageSignal(signal) {
 // answer is for the page in view; with null it is wanted whatever page follows.
 export async function ask(method, path, { signal = pageSignal, ...more } = {}) {
   const options = { ...more, signal: method === "GET" ? signal : null };
+  const used = token();
   let response = await send(method, path, options);
-  if (response.status === 401 && (await signIn?.())) response = await send(method, path, options);
+  if (response.status === 401 && used !== declined) {
+    if (token() !== used || (await signIn?.())) response = await send(method, path, options);
+    if (response.status === 401) declined = token();
+  }
   signal?.throwIfAborted();
   if (!response.ok) throw new Refusal(response.status, await response.json().catch(() => ({})));
   return response;
@@ -79,8 +85,11 @@ const prefetched = new Map();
 export function prefetch(path) {
   const answer = json(path);
   prefetched.set(path, answer);
-  // The failure belongs to the page that gets it; a later page asks again.
-  answer.catch(() => prefetched.get(path) === answer && prefetched.delete(path));
+  // A failure is told by the page that gets it. What was aborted was another page's: the next one asks again.
+  answer.catch(
+    ({ name }) =>
+      name === "AbortError" && prefetched.get(path) === answer && prefetched.delete(path),
+  );
 }
 
 // The answer's JSON.
