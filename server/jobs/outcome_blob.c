@@ -73,11 +73,13 @@ static bool blob_allows(Blob *blob, uint64_t count, uint64_t size) {
 }
 
 static void blob_pass(Blob *blob, void *data, size_t size) {
+    if (size == 0)
+        return;
     if (blob->bytes != NULL) {
         bytes_put(blob->bytes, data, size);
     } else if (!blob_allows(blob, 1, size)) {
         memset(data, 0, size);
-    } else if (size > 0) {
+    } else {
         memcpy(data, blob->at, size);
         blob->at += size;
         blob->left -= size;

@@ -113,6 +113,8 @@ class Slurm:
         missing = [name for name in PROGRAMS if shutil.which(name, path=PATH) is None]
         if missing:
             raise program.Skipped(f"Slurm is not installed: no {', '.join(missing)}")
+        if not os.path.ismount("/sys/fs/cgroup"):
+            raise program.Skipped("slurmd does not start where /sys/fs/cgroup is not mounted")
         self.folder = tempfile.mkdtemp(prefix="impactd-slurm-")
         os.chmod(self.folder, 0o755)  # munge's socket lies in it
         self.bin = os.path.join(self.folder, "bin")
