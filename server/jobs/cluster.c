@@ -31,7 +31,6 @@ static const double scan_least = 0.2, scan_most = 2;       // [s] between looks 
 static const double poll_most = 60;                        // [s] between questions to Slurm
 static const double facts_each = 5;                        // [s]
 static const double tidy_each = 1;                         // [s]
-static const double chunk_target = 60;                     // [s] of CPU
 static const double audit_share = 0.02;                    // of the time since the study began
 
 typedef enum ChunkState { CHUNK_TO_DO, CHUNK_SUBMITTED, CHUNK_DONE } ChunkState;
@@ -57,7 +56,7 @@ typedef struct ClusterStudy {
     size_t window;   // tasks that Slurm takes at once, as far as is known
     bool is_known;   // Slurm told what it has since the start
     bool is_full;    // there was no space for a chunk
-    bool is_probed;  // of late, whether there is
+    bool is_probed;  // whether there is, since Slurm was asked
     int64_t began_ns, scan_ns, poll_ns, submit_ns;
     double scan_pause, poll_pause, submit_pause, audit_seconds;
     // Under the manager's lock:
@@ -157,7 +156,7 @@ static Status study_plan(ClusterStudy *study, size_t slots, Problem *problem) {
     plan->members = run->work->members;
     plan->is_strided = run->is_sweep;
     const double members = (double)plan->members;
-    double chunks = fmax(ceil(task->queued.seconds / chunk_target), (double)(4 * slots));
+    double chunks = (double)study_count_chunks(run, run->work->members, slots);
     chunks = fmax(chunks, ceil(members * (double)run->work->part_bytes / CHUNK_BYTES));
     chunks = fmin(chunks, members);
     // As many as have members.

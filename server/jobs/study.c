@@ -201,9 +201,10 @@ static bool study_is_over(StudyRun *run) {
     return atomic_load(&run->engine.is_over) || atomic_load(&run->task->is_stopped);
 }
 
-static size_t sweep_count_chunks(size_t points, size_t slots, double seconds, double each) {
-    const double all = (double)points;
-    double chunks = fmin(ceil(seconds / each), CHUNKS_MAX);
+size_t study_count_chunks(const StudyRun *run, size_t members, size_t slots) {
+    const double all = (double)members;
+    const double each = run->is_clustered ? cluster_chunk_seconds : chunk_seconds;
+    double chunks = fmin(ceil(run->task->queued.seconds / each), CHUNKS_MAX);
     chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
     chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * slots));
     chunks = ceil(chunks / (double)slots) * (double)slots; // all slots are busy to the end
@@ -228,8 +229,7 @@ static Status sweep_begin(StudyRun *run, size_t slots, Problem *problem) {
             return study_no_memory(problem);
         row->metrics = metrics;
         row->points = points;
-        row->chunks = sweep_count_chunks((size_t)points, slots, run->task->queued.seconds,
-                                         run->is_clustered ? cluster_chunk_seconds : chunk_seconds);
+        row->chunks = study_count_chunks(run, (size_t)points, slots);
         row->created_unix_ms = clock_unix_ms();
     }
     // Also a row that is there: it may be about to be deleted with the last job before this one.

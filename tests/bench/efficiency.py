@@ -19,7 +19,7 @@ DEVIATION = 0.03  # of the time of a chunk
 
 
 def count_chunks(scenes, slots, seconds):
-    """sweep_count_chunks."""
+    """study_count_chunks."""
     chunks = min(math.ceil(seconds / CHUNK_SECONDS), CHUNKS_MAX)
     chunks = max(chunks, math.ceil(scenes / CHUNK_ROWS), CHUNKS_PER_SLOT * slots)
     return min(math.ceil(chunks / slots) * slots, scenes)

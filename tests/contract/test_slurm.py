@@ -12,7 +12,7 @@ WAITS = True
 
 
 def test_a_sweep_has_the_rows_of_threads():
-    """A sweep made by Slurm is to the byte that of threads; progress is told; no task and no file is left."""
+    """A sweep made by Slurm is to the byte that of threads; progress is shown; no task and no file is left."""
     with site() as at:
         at.begin(sweep())
         at.until(lambda cluster: cluster["chunks"] == 12)

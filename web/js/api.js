@@ -85,7 +85,7 @@ const prefetched = new Map();
 export function prefetch(path) {
   const answer = json(path);
   prefetched.set(path, answer);
-  // A failure is told by the page that gets it. What was aborted was another page's: the next one asks again.
+  // The page that gets it shows a failure. What was aborted was another page's: the next one asks again.
   answer.catch(
     ({ name }) =>
       name === "AbortError" && prefetched.get(path) === answer && prefetched.delete(path),
