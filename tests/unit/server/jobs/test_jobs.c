@@ -399,7 +399,7 @@ TEST(running_jobs_share_one_budget_of_memory) {
     Job *jobs[3];
     for (size_t i = 0; i < 3; i++)
         jobs[i] = submit(&room, 0.001 * (double)(i + 1), 20000);
-    for (int i = 0; i < 300; i++)
+    for (int i = 0; i < 30; i++)
         nanosleep(&moment, NULL);
     JobStats stats;
     jobs_stats(room.manager, &stats);
