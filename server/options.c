@@ -312,7 +312,7 @@ Status options_read(const Field *fields, void *item, int argc, char *const *argv
         if (path != NULL)
             file_read(&reader, path);
     }
-    return problem->count > before ? STATUS_USAGE : STATUS_OK;
+    return problem->count > before ? problem->status : STATUS_OK;
 }
 
 char option_spell(const Field *row, char name[OPTION_NAME]) {

@@ -13,6 +13,7 @@
 
 #include "server/util/clock.h"
 #include "server/util/sha256.h"
+#include "server/util/thread_pool.h"
 
 enum {
     FOLLOW_MS = 500,
@@ -173,12 +174,10 @@ Status tokens_open(Db *db, bool are_required, Tokens **tokens, Problem *problem)
     pthread_cond_init(&made->end, &attributes);
     pthread_condattr_destroy(&attributes);
     Status status = tokens_read(made, problem);
-    if (status == STATUS_OK) {
-        made->is_following = pthread_create(&made->follower, NULL, tokens_follow, made) == 0;
-        if (!made->is_following)
-            status = problem_set(problem, STATUS_INTERNAL,
-                                 "the thread that follows the tokens cannot be started");
-    }
+    if (status == STATUS_OK)
+        status = thread_start(&made->follower, tokens_follow, made,
+                              "the thread that follows the tokens", problem);
+    made->is_following = status == STATUS_OK;
     if (status != STATUS_OK) {
         tokens_close(made);
         return status;

@@ -36,9 +36,9 @@ Status input_read(const char *path, Bytes *text, Problem *problem) {
         fclose(file);
     if (error != 0)
         return problem_set(problem, STATUS_IO, "cannot be read: %s", strerror(error));
-    return text->is_failed
-               ? problem_set(problem, STATUS_TOO_LARGE, "is larger than %d bytes", INPUT_BYTES)
-               : STATUS_OK;
+    if (text->is_over)
+        return problem_set(problem, STATUS_TOO_LARGE, "is larger than %d bytes", INPUT_BYTES);
+    return text->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for it") : STATUS_OK;
 }
 
 int input_command(const Command *self, const char *what, const Options *options, void *settings,

@@ -102,7 +102,9 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     const int cause = system_cause(connection);
     Status status = STATUS_IO;
     char message[200];
-    snprintf(message, sizeof message, "%s", sqlite3_errmsg(connection));
+    // Without memory SQLite also says that a temporary file could not be opened.
+    snprintf(message, sizeof message, "%s",
+             code == SQLITE_NOMEM ? sqlite3_errstr(code) : sqlite3_errmsg(connection));
     text_make_ascii(message);
     for (size_t i = 0; i < COUNT(known); i++)
         if (known[i].code == code)

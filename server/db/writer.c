@@ -24,6 +24,7 @@
 #include "server/db/db_private.h"
 #include "server/util/clock.h"
 #include "server/util/embedded.h"
+#include "server/util/thread_pool.h"
 
 enum { READERS = 4, RECORDS_BYTES = 64 << 20, MATERIALS_BYTES = 1 << 20 };
 
@@ -323,10 +324,9 @@ Status db_open_with(const char *directory, bool is_beside, const CheckedTable *c
                     : directory != NULL ? db_open_files(made, directory, is_beside, tables, problem)
                                         : db_open_memory(made, tables, problem);
     if (status == STATUS_OK)
-        made->is_writing = pthread_create(&made->writer, NULL, writer_main, made) == 0;
-    if (status == STATUS_OK && !made->is_writing)
         status =
-            problem_set(problem, STATUS_INTERNAL, "the database's writer thread cannot be started");
+            thread_start(&made->writer, writer_main, made, "the database's writer thread", problem);
+    made->is_writing = status == STATUS_OK;
     if (status != STATUS_OK) {
         db_close(made);
         return status;

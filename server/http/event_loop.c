@@ -18,6 +18,7 @@
 
 #include "server/http/connection.h"
 #include "server/util/clock.h"
+#include "server/util/thread_pool.h"
 
 enum {
     THREADS_MAX = 16,       // that run handlers which may take a while
@@ -158,18 +159,18 @@ static Status loop_start(EventLoop *loop, Server *server, Problem *problem) {
         is_tls ? MHD_OPTION_HTTPS_CERT_CALLBACK : MHD_OPTION_END, settings->certificate,
         MHD_OPTION_END);
     loop->wakeup = loop->daemon != NULL ? eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK) : -1;
-    const int code = loop->wakeup < 0 ? errno : pthread_create(&loop->thread, NULL, loop_run, loop);
-    if (loop->daemon != NULL && code == 0)
+    Status status =
+        loop->wakeup < 0
+            ? problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s: %s",
+                          is_tls ? " with this certificate and key" : "", strerror(errno))
+            : thread_start(&loop->thread, loop_run, loop, "an event loop", problem);
+    if (status == STATUS_OK)
         return STATUS_OK;
     if (loop->daemon != NULL)
         MHD_stop_daemon(loop->daemon);
     close(loop->wakeup); // -1 is harmless
     timer_list_free(loop->timers);
-    return loop->daemon == NULL
-               ? problem_set(problem, STATUS_INTERNAL, "the HTTP library cannot start%s",
-                             is_tls ? " with this certificate and key" : "")
-               : problem_set(problem, STATUS_INTERNAL, "an event loop cannot be started: %s",
-                             strerror(code));
+    return status;
 }
 
 // Stops the loop's thread; none of its callbacks runs afterwards.

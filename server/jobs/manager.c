@@ -11,6 +11,7 @@
 #include "server/jobs/study.h"
 #include "server/util/clock.h"
 #include "server/util/process.h"
+#include "server/util/thread_pool.h"
 
 static const size_t queue_bytes_default = (size_t)256 << 20; // of scenes
 
@@ -87,17 +88,15 @@ static Status manager_start_workers(JobManager *manager, Problem *problem) {
         Worker *worker = &manager->workers[manager->worker_count];
         worker->manager = manager;
         worker->is_spare = manager->worker_count == count - 1;
-        if (pthread_create(&worker->thread, NULL, worker_main, worker) != 0)
-            status = problem_set(problem, STATUS_INTERNAL, "worker %zu of %zu could not be started",
-                                 manager->worker_count + 1, count);
-        else
+        status = thread_start(&worker->thread, worker_main, worker, "a worker", problem);
+        if (status == STATUS_OK)
             manager->worker_count++;
     }
     pthread_mutex_unlock(&manager->lock);
     if (status != STATUS_OK || !manager->settings.has_maintenance)
         return status;
-    if (pthread_create(&manager->maintenance, NULL, maintenance_main, manager) != 0)
-        return problem_set(problem, STATUS_INTERNAL, "the maintenance thread cannot be started");
+    TRY(thread_start(&manager->maintenance, maintenance_main, manager, "the maintenance thread",
+                     problem));
     manager->is_maintained = true;
     return STATUS_OK;
 }

@@ -1,7 +1,8 @@
 #include "server/util/thread_pool.h"
 
-#include <pthread.h>
+#include <errno.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct ThreadPool {
     pthread_mutex_t lock;
@@ -34,10 +35,22 @@ static void *thread_pool_work(void *context) {
     return NULL;
 }
 
+Status thread_start(pthread_t *thread, void *(*run)(void *), void *item, const char *name,
+                    Problem *problem) {
+    const int code = pthread_create(thread, NULL, run, item);
+    if (code == 0)
+        return STATUS_OK;
+    return problem_set(problem, code == EAGAIN ? STATUS_NO_MEMORY : STATUS_INTERNAL,
+                       "%s cannot be started: %s", name,
+                       code == EAGAIN ? "too little memory or too many threads" : strerror(code));
+}
+
 // With the lock held, or before other threads know the pool.
-static void thread_pool_start_thread(ThreadPool *pool) {
-    if (pthread_create(&pool->threads[pool->count], NULL, thread_pool_work, pool) == 0)
-        pool->count++;
+static Status thread_pool_start_thread(ThreadPool *pool, Problem *problem) {
+    TRY(thread_start(&pool->threads[pool->count], thread_pool_work, pool, "a thread of a pool",
+                     problem));
+    pool->count++;
+    return STATUS_OK;
 }
 
 Status thread_pool_open(size_t max_threads, ThreadPool **pool, Problem *problem) {
@@ -49,12 +62,11 @@ Status thread_pool_open(size_t max_threads, ThreadPool **pool, Problem *problem)
     pthread_cond_init(&made->has_work, NULL);
     made->last = &made->first;
     made->max_threads = max_threads;
-    thread_pool_start_thread(made); // one is certain: nothing waits for ever
-    if (made->count == 0) {
+    // One is certain: nothing waits for ever.
+    const Status status = thread_pool_start_thread(made, problem);
+    if (status != STATUS_OK) {
         thread_pool_close(made);
-        return problem_set(problem, STATUS_INTERNAL,
-                           "the first thread of a pool cannot be "
-                           "started");
+        return status;
     }
     *pool = made;
     return STATUS_OK;
@@ -64,7 +76,7 @@ void thread_pool_add(ThreadPool *pool, WorkItem *item) {
     item->next = NULL;
     pthread_mutex_lock(&pool->lock);
     if (pool->unfinished >= pool->count && pool->count < pool->max_threads)
-        thread_pool_start_thread(pool);
+        (void)thread_pool_start_thread(pool, NULL);
     *pool->last = item;
     pool->last = &item->next;
     pool->unfinished++;

@@ -3,10 +3,15 @@
 #ifndef SERVER_UTIL_THREAD_POOL_H
 #define SERVER_UTIL_THREAD_POOL_H
 
+#include <pthread.h>
 #include <stdbool.h>
 #include <stddef.h>
 
 #include "core/base/status.h"
+
+// pthread_create; its failure names the thread. STATUS_NO_MEMORY, also where there are too many.
+Status thread_start(pthread_t *thread, void *(*run)(void *), void *item, const char *name,
+                    Problem *problem);
 
 typedef struct ThreadPool ThreadPool;
 
