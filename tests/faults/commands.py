@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Every allocation or file call of a command fails in turn, once and from then on: it does its work, or says why not and changes nothing.
 
-    tests/faults/commands.py --build build allocations|EIO|ENOSPC|short [--stride 1] [--processes 4] [COMMAND...]
+    tests/faults/commands.py --build build stacks|allocations|EIO|ENOSPC|short [--stride 1] [--processes 4] [COMMAND...]
+
+A command has some 20,000 allocations, but 2,000 to 3,000 distinct call stacks of them: `stacks` fails the first allocation with each.
 
 Starts of the server (with a new database, and with jobs to continue), copies, checks and files of results. After each fault the
 database is whole, in its old state or the new one, and the command without a fault succeeds. The suite runs a few of them
@@ -26,7 +28,7 @@ from control import ALLOCATIONS, KINDS, Control  # noqa: E402
 
 TIMEOUT = 60  # [s]
 # What a message says of a fault. A disk that did not answer once is not called damaged.
-WORDS = {"allocations": ("memory",), "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing"), 
+WORDS = {"allocations": ("memory",), "stacks": ("memory",), "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing"), 
          "ENOSPC": ("No space", "no room", "cannot open", "could not be opened", "unable to open"), "short": ("",)}
 SERVE = ("serve", "--listen", "127.0.0.1:0", "--workers", "1", "--data", "{}/data")
 MOTION = "PEER\nrecord\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 4, DT= .0200 SEC\n0.1 -0.2 0.3 -0.1\n"
@@ -148,11 +150,11 @@ CASES = {
 
 
 class Campaign:
-    """Every `stride`-th number of one command, from `first` on."""
+    """Every `stride`-th call or call stack of one command, from the `first` on."""
 
     def __init__(self, kind, stride=1, first=1):
         self.kind, self.stride, self.first = kind, stride, first
-        self.calls, self.error = (ALLOCATIONS, 0) if kind == "allocations" else KINDS[kind]
+        self.calls, self.error = KINDS.get(kind, (ALLOCATIONS, 0))
         self.tried, self.count, self.outcomes, self.wrong = 0, 0, collections.Counter(), []
 
     def fault(self, what, text):
@@ -171,16 +173,20 @@ class Campaign:
             before = self.case.state(self.folder)
             control = Control(self.folder)
             self.faulty = {**os.environ, **control.environment}
-            control.arm(0, self.calls, self.error)
+            control.arm(0, self.calls, self.error, lists_stacks=self.kind == "stacks")
             code, said = self.case.run(self.folder, self.faulty)
             self.count, _ = control.disarm()
             assert code == 0, (name, code, said)
             after = self.case.state(self.folder)
+            # Each is a number of a call and a call stack; 0: any.
+            calls = [(1, stack) for stack in control.stacks()] or [(n, 0) for n in range(1, self.count + 1)]
+            self.count = len(calls)
             for permanent in (False, True):
-                for n in range(self.first, self.count + 1, self.stride):
+                for n, stack in calls[self.first - 1::self.stride]:
                     self.case.reset(self.template, self.folder)
-                    control.arm(n, self.calls, self.error, permanent)
-                    self.judge(f"{name}, {'from call' if permanent else 'call'} {n} of {self.count}", control, before, after)
+                    control.arm(n, self.calls, self.error, permanent, stack)
+                    where = f"stack {stack:x}" if stack else f"call {n} of {self.count}"
+                    self.judge(f"{name}, {'from ' if permanent else ''}{where}", control, before, after)
         finally:
             shutil.rmtree(root, ignore_errors=True)
 
@@ -192,7 +198,9 @@ class Campaign:
             self.fault("hung", where)
             return
         finally:
-            control.disarm()
+            _, failed = control.disarm()
+        if not failed:
+            self.outcomes["not reached"] += 1
         if code < 0 or "ERROR: " in said or "runtime error" in said:
             self.fault("crashed", f"{where}: {code}: {said[-3000:]}")
         elif code == 0:
@@ -225,7 +233,7 @@ def main():
     parser.add_argument("--build", default=program.build)
     parser.add_argument("--stride", type=int, default=1, help="each so many N")
     parser.add_argument("--processes", type=int, default=4, help="commands at the same time")
-    parser.add_argument("kind", choices=["allocations", *KINDS])
+    parser.add_argument("kind", choices=["stacks", "allocations", *KINDS])
     parser.add_argument("names", nargs="*", default=list(CASES))
     arguments = parser.parse_args()
     program.build = os.path.abspath(arguments.build)

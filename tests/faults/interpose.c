@@ -14,6 +14,7 @@
 #include <sys/mman.h>
 #include <sys/types.h>
 #include <unistd.h>
+#include <unwind.h>
 
 // The bits of Control.calls.
 enum {
@@ -29,6 +30,8 @@ enum {
     CALL_RESERVE,
 };
 
+enum { MAX_FILES = 4096, MAX_STACKS = 1 << 16 };
+
 // The control file; tests/faults/control.py writes it. Nothing here allocates.
 typedef struct {
     _Atomic uint64_t n;      // the call that fails, from 1 on; 0: none, they are only counted
@@ -37,9 +40,10 @@ typedef struct {
     _Atomic uint32_t calls;  // a bit for each kind that is counted; 0: off
     _Atomic uint32_t is_permanent; // all calls from the n-th on fail
     _Atomic int32_t error;   // errno of a failing file call; 0: it reads or writes half
+    _Atomic uint32_t lists_stacks; // allocations add their call stack to `stacks`
+    _Atomic uint64_t stack; // not 0: allocations are counted from the first with this call stack on
+    _Atomic uint64_t stacks[MAX_STACKS]; // hash table; 0: a free place
 } Control;
-
-enum { MAX_FILES = 4096 };
 
 static Control *control;
 static char folder[PATH_MAX];
@@ -95,10 +99,52 @@ __attribute__((constructor)) static void interpose_start(void)
     control = map == MAP_FAILED ? NULL : map;
 }
 
+static uint64_t hash_add(uint64_t hash, uint64_t number)
+{
+    return (hash ^ number) * 0x100000001B3 ^ hash >> 29;
+}
+
+// An address counts from the start of its library, so that it is the same in each run.
+static _Unwind_Reason_Code stack_add(struct _Unwind_Context *frame, void *hash)
+{
+    uint64_t address = _Unwind_GetIP(frame);
+    struct dl_find_object library;
+    if (_dl_find_object((void *)address, &library) == 0) {
+        const struct link_map *map = library.dlfo_link_map;
+        *(uint64_t *)hash = hash_add(hash_add(*(uint64_t *)hash, address - map->l_addr), (uintptr_t)map->l_ld - map->l_addr);
+    }
+    return _URC_NO_REASON;
+}
+
+static uint64_t stack_hash(void)
+{
+    uint64_t hash = 0xCBF29CE484222325;
+    (void)_Unwind_Backtrace(stack_add, &hash);
+    return hash != 0 ? hash : 1;
+}
+
+static void stacks_add(uint64_t stack)
+{
+    for (uint64_t i = stack, tried = 0; tried < MAX_STACKS; i++, tried++) {
+        uint64_t there = 0;
+        if (atomic_compare_exchange_strong(&control->stacks[i % MAX_STACKS], &there, stack) || there == stack)
+            return;
+    }
+}
+
 static bool call_fails(unsigned call)
 {
     if (control == NULL || (atomic_load(&control->calls) & 1u << call) == 0)
         return false;
+    uint64_t awaited = atomic_load(&control->count) == 0 ? atomic_load(&control->stack) : 0;
+    bool is_listed = atomic_load(&control->lists_stacks) != 0;
+    if (call == CALL_ALLOCATE && (is_listed || awaited != 0)) {
+        uint64_t stack = stack_hash();
+        if (is_listed)
+            stacks_add(stack);
+        if (awaited != 0 && stack != awaited)
+            return false;
+    }
     uint64_t number = atomic_fetch_add(&control->count, 1) + 1, n = atomic_load(&control->n);
     bool fails = n > 0 && (number == n || (number > n && atomic_load(&control->is_permanent)));
     if (fails)
