@@ -242,8 +242,8 @@ Status study_run(const Variant *study, const Simulation *simulation, const Study
                  Variant **answer, Problem *problem);
 
 // The same in steps, for a study with members that several threads make: begin, make and fold each
-// wanted member, end, free. The work borrows study, simulation and answer; both outputs are NULL
-// after a failure.
+// wanted member, end, free. The work borrows study, simulation, limits and answer; both outputs are
+// NULL after a failure.
 Status study_begin(const Variant *study, const Simulation *simulation, const StudyTools *tools,
                    Variant **answer, StudyWork **work, Problem *problem);
 // Makes a member. One that fails is a part too; an error ends the study. The part is freed by

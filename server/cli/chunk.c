@@ -30,6 +30,7 @@ typedef struct ChunkMaking {
     ChunkPlan plan;
     ChunkKey key;
     StudyRequest request;
+    SimulationLimits limits; // the study refers to them
     Variant *answer;
     StudyWork *work;
     size_t chunk, count, made; // members
@@ -48,9 +49,8 @@ static void chunk_stop(int signal) {
 
 // The child: makes the members from `made` on and writes them to the pipe. Returns its exit code.
 static int chunk_make_members(const ChunkMaking *making, FILE *pipe) {
-    const SimulationLimits limits = chunk_plan_limits(&making->plan);
     Workspace workspace = {0};
-    const StudyTools tools = {.limits = &limits, .workspace = &workspace};
+    const StudyTools tools = {.limits = &making->limits, .workspace = &workspace};
     Problem problem;
     for (size_t i = making->made; i < making->count; i++) {
         const size_t member = chunk_plan_member(&making->plan, making->chunk, i);
@@ -152,9 +152,9 @@ static int chunk_open(ChunkMaking *making, Problem *problem) {
         (void)problem_set(problem, STATUS_INVALID, "there is no chunk %zu", making->chunk);
         return CHUNK_BAD;
     }
-    const SimulationLimits limits = chunk_plan_limits(&making->plan);
+    making->limits = chunk_plan_limits(&making->plan);
     Workspace workspace = {0};
-    const StudyTools tools = {.limits = &limits, .workspace = &workspace};
+    const StudyTools tools = {.limits = &making->limits, .workspace = &workspace};
     status = study_begin(making->request.study, &making->request.simulation, &tools,
                          &making->answer, &making->work, problem);
     workspace_clear(&workspace);

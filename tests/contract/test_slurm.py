@@ -9,6 +9,7 @@ from site_of_slurm import ensemble, fragility, main, site, sweep, tasks_of  # no
 from slurm import until  # noqa: E402
 
 WAITS = True
+SANITIZED = "nightly"
 
 
 def test_a_sweep_has_the_rows_of_threads():
