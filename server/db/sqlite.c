@@ -989,26 +989,41 @@ Status sqlite_copy(Sqlite *from, Sqlite *to, const Progress *watch, Problem *pro
     return sqlite_execute(to, "PRAGMA journal_mode = MEMORY", problem);
 }
 
+typedef struct CheckLine {
+    char text[256];
+} CheckLine;
+
+typedef struct CheckLines {
+    CheckLine *at;
+    size_t count;
+} CheckLines;
+
+static Status check_file(Sqlite *database, CheckLines *lines, Problem *problem) {
+    static const char sql[] = "SELECT integrity_check AS text FROM pragma_integrity_check(100)";
+    static const SqlColumn columns[] = {COLUMN(CheckLine, text), COLUMN_END};
+    return sqlite_list(database, sql, NULL, NULL, columns, sizeof *lines->at, lines, problem);
+}
+
+static bool check_is_passed(const CheckLines *lines) {
+    return lines->count == 1 && strcmp(lines->at[0].text, "ok") == 0;
+}
+
 Status sqlite_check(Sqlite *database, void (*report_found)(void *context, const char *damage),
                     void *context, uint64_t *count, Problem *problem) {
-    static const char sql[] = "SELECT integrity_check AS text FROM pragma_integrity_check(100)";
-    typedef struct Verdict {
-        char text[256];
-    } Verdict;
-    static const SqlColumn columns[] = {COLUMN(Verdict, text), COLUMN_END};
-    struct {
-        Verdict *at;
-        size_t count;
-    } found;
+    CheckLines lines = {.at = NULL};
     *count = 0;
-    TRY(sqlite_list(database, sql, NULL, NULL, columns, sizeof *found.at, &found, problem));
-    for (size_t i = 0; i < found.count; i++)
-        if (strcmp(found.at[i].text, "ok") != 0) {
-            text_make_ascii(found.at[i].text);
-            report_found(context, found.at[i].text);
-            ++*count;
-        }
-    free(found.at);
+    TRY(check_file(database, &lines, problem));
+    // To SQLite a page is also damaged where memory for it was lacking: that is not found again.
+    if (!check_is_passed(&lines)) {
+        free(lines.at);
+        TRY(check_file(database, &lines, problem));
+    }
+    *count = check_is_passed(&lines) ? 0 : lines.count;
+    for (size_t i = 0; i < *count; i++) {
+        text_make_ascii(lines.at[i].text);
+        report_found(context, lines.at[i].text);
+    }
+    free(lines.at);
     return STATUS_OK;
 }
 
