@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """How many lines and branches of server/ and core/ the tests reach, in a build of the preset coverage.
 
-    coverage.py --build build-coverage run [NAME]   runs the unit tests and those of contract/ that a commit has to pass, all
-                                                 or those whose name holds NAME, and prints the figures
+    coverage.py --build build-coverage run [NAME]   runs the unit tests and those of contract/ that a commit has to pass, and the
+                                                 drills of clusters; all or those whose name holds NAME; prints the figures
     coverage.py --build build-coverage           prints the figures, by folder
     coverage.py --build build-coverage WORD...   prints the unreached lines and branches of files whose path holds a word
 
@@ -33,7 +33,7 @@ def run(build, name):
         with open(path, encoding="utf-8") as file:
             is_nightly = "\nNIGHTLY = True" in file.read()
         test = os.path.basename(path)[len("test_"):-len(".py")]
-        if is_nightly or test in WITHOUT_PROGRAM or name not in test:
+        if (is_nightly and test != "slurm_drills") or test in WITHOUT_PROGRAM or name not in test:
             continue
         done = subprocess.run([sys.executable, path, "--build", build], capture_output=True, text=True, check=False)
         print((done.stdout.splitlines() or [f"{path} printed nothing"])[-1], flush=True)

@@ -124,6 +124,8 @@ part_kills() {
         check "$python" "tests/contract/test_$file.py" --build build
         [ -z "$is_quick" ] || [ "$file" = exchange_kill ] || break
     done
+    # What was acknowledged is there after each of many kills, also during starts. 900 s
+    sized '--cycles 20' '--cycles 1000' "$python" tests/storm/kills.py --build build
     # What is acknowledged is on the disk, whichever of the writes that were not synced are there too. 120 s
     sized '--states 20 --scenes 5 --daemons 2' '--states 1500 --scenes 60 --daemons 100' "$python" tests/power/power.py --build build
     # Damaged bytes, pages, indices and logs: right answers or problems, no end of the daemon. 100 s
@@ -215,7 +217,7 @@ part_browser() {
     done
 }
 
-# 900 s of CPU.
+# 1100 s of CPU.
 part_coverage() {
     build coverage
     sized 'run cache' run "$python" tests/coverage.py --build build-coverage
