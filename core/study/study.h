@@ -12,6 +12,7 @@ typedef struct StudyTools {
     Workspace *workspace;           // may be NULL
     double (*cpu)(void *context);   // CPU time of this thread [s]
     void *cpu_context;
+    bool is_validated; // the request was begun before, so that not all members are validated again
 } StudyTools;
 
 // Result of one run. A run that failed has a reason and no numbers.

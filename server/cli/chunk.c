@@ -154,7 +154,8 @@ static int chunk_open(ChunkMaking *making, Problem *problem) {
     }
     making->limits = chunk_plan_limits(&making->plan);
     Workspace workspace = {0};
-    const StudyTools tools = {.limits = &making->limits, .workspace = &workspace};
+    const StudyTools tools = {
+        .limits = &making->limits, .workspace = &workspace, .is_validated = true};
     status = study_begin(making->request.study, &making->request.simulation, &tools,
                          &making->answer, &making->work, problem);
     workspace_clear(&workspace);

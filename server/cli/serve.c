@@ -55,7 +55,7 @@ static const Field serve_fields[] = {
     FIELD_REAL(ServeSettings, max_cpu_seconds, "s", WITHIN(1e-6, 1e9), SIMULATION_CPU_SECONDS, "reject scenes predicted to need more CPU time; running jobs are stopped at about 3 times this"),
     FIELD_REAL(ServeSettings, max_study_seconds, "s", WITHIN(0, 1e9), 3600, "reject studies predicted to need more CPU time; 0: no limit"),
     FIELD_COUNT(ServeSettings, max_run_bytes, "B", WITHIN(1 << 20, 1099511627776.0), SIMULATION_BYTES, "reject scenes predicted to need more memory"),
-    FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e7), SWEEP_POINTS, "maximum number of points of a sweep"),
+    FIELD_COUNT(ServeSettings, max_points, NULL, WITHIN(1, 1e8), SWEEP_POINTS, "maximum number of points of a sweep"),
     FIELD_COUNT(ServeSettings, cache_bytes, "B", WITHIN(0, 1099511627776.0), 256 * MIB, "in-memory cache: 1/4 for responses, 3/4 for results"),
     FIELD_COUNT(ServeSettings, store_bytes, "B", WITHIN(0, 1099511627776.0), 1024 * MIB, "disk space for series that are expensive to compute"),
     FIELD_REAL(ServeSettings, keep_days, "d", WITHIN(0, 36500), 0, "delete jobs that finished longer ago; a result is deleted with its last job; 0: never"),

@@ -205,6 +205,24 @@ def test_points_too_many_to_be_judged_at_once_are_judged_before_the_first_runs()
         assert daemon.get(f"/v1/jobs/{job['id']}/table.json").json()["done"] == 0
 
 
+def test_a_hundred_million_points_begin_at_once_in_little_memory():
+    """1e8 points are accepted where --max-points says so, rows come at once, memory does not grow with the points."""
+    axes = [{"pointer": "/dampers/0/clearance", "from": 0.005, "to": 0.03, "count": 10000},
+            {"pointer": "/dampers/0/mass", "from": 0.05, "to": 0.2, "count": 10000}]
+    with program.daemon() as small:
+        assert "at most 1000000 are allowed" in json.dumps(errors(small, sweep(*axes)))
+    with program.daemon("--max-points", "100000000", "--max-study-seconds", "0") as daemon:
+        job = daemon.submit(sweep(*axes, changes={"duration": 0.5}), headers={"Prefer": "respond-async"}).json()["id"]
+        end = time.monotonic() + 20
+        while not (points := daemon.get(f"/v1/jobs/{job}").json().get("points", {})).get("done"):
+            assert time.monotonic() < end, points
+            time.sleep(0.1)
+        assert points["all"] == 10**8 and points["failed"] == 0
+        with open(f"/proc/{daemon.process.pid}/statm", encoding="ascii") as file:
+            assert int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE") < (1e9 if program.is_sanitized() else 200e6)
+        assert daemon.request("DELETE", f"/v1/jobs/{job}").status in (200, 204)
+
+
 def test_failed_points_are_rows_with_a_reason_and_can_be_made_again():
     """An unstable step is a row's status; a retry is a job of its own and changes nothing that was made."""
     with Daemon(program.build) as daemon:

@@ -206,6 +206,39 @@ TEST(a_fault_of_two_values_together_is_found) {
     study_request_clear(&inquiry);
 }
 
+// Of a million points the validation takes 8 s, which the tasks of a cluster would each spend
+// again.
+TEST(a_sweep_of_many_points_or_that_was_begun_before_begins_at_once) {
+    const SimulationLimits limits = {.points = 3 * SWEEP_POINTS};
+    for (int before = 0; before < 2; before++) {
+        StudyRequest inquiry = study_request_make();
+        size_t looks = 0;
+        const Progress progress = {&looks, count_look};
+        const StudyTools tools = {.limits = &limits, .progress = &progress, .is_validated = before};
+        const size_t each = before ? 100 : 1001;
+        Variant *answer;
+        StudyWork *work;
+        StudyPart *part;
+        range_add(&inquiry, "/dampers/0/position", 0, 0.008, each);
+        range_add(&inquiry, "/dampers/0/clearance", 0.01, 0.03, each);
+        assert_int_equal(study_request_complete(&inquiry, NULL, NULL, &problem), STATUS_OK);
+        assert_int_equal(
+            study_begin(inquiry.study, &inquiry.simulation, &tools, &answer, &work, &problem),
+            STATUS_OK);
+        assert_int_equal(looks, 0);
+        assert_int_equal(work->members, each * each);
+        // Both values are right, but not together.
+        assert_int_equal(study_part_make(work, (each - 1) * each, &tools, &part, &problem),
+                         STATUS_OK);
+        assert_int_equal(part->run.status, STATUS_INVALID);
+        assert_non_null(part->run.why);
+        study_part_free(work, part);
+        study_free(work);
+        variant_free(answer);
+        study_request_clear(&inquiry);
+    }
+}
+
 TEST(too_many_points_or_values_are_refused) {
     const SimulationLimits limits = {.points = 100};
     StudyRequest inquiry = study_request_make();
