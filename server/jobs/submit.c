@@ -600,6 +600,11 @@ Status jobs_resume(JobManager *manager, const char *id, Problem *problem) {
     problem_clear(&fault);
     Status status = db_job_load_with_scene(manager->db, id, &row, &fault);
     const bool is_damaged = status == STATUS_INTERNAL;
+    // A damaged index also leads to jobs that have ended: these stay as they are.
+    if (status == STATUS_OK && job_state_is_final(row.state)) {
+        job_row_clear(&row);
+        return STATUS_OK;
+    }
     if (status == STATUS_OK)
         status = jobs_prepare(manager->db, row.scene, strlen(row.scene), &manager->settings.limits,
                               &request, &warnings, &fault);

@@ -201,6 +201,25 @@ def test_an_unfinished_job_that_changed_fails():
             assert shown["status"] == "failed" and "damaged" in shown["problem"]["detail"], shown
 
 
+def test_an_ended_job_in_the_index_of_unfinished_ones_stays_as_it_ended():
+    """A damaged index says that a job that has ended is unfinished: it is not run again, and check-db finds the index."""
+    with tempfile.TemporaryDirectory() as folder:
+        with program.daemon(data=folder) as daemon:
+            place = f"/v1/jobs/{program.finished(daemon, program.scene('paper_free_sponge'))['id']}"
+            ended = daemon.get(place).json()
+        with contextlib.closing(sqlite3.connect(os.path.join(folder, "impactd.db"), isolation_level=None)) as connection:
+            written = connection.execute("SELECT sql FROM sqlite_schema WHERE name = 'jobs_unfinished'").fetchone()[0]
+            connection.execute("DROP INDEX jobs_unfinished")
+            connection.execute(written[:written.index("WHERE")])
+            connection.execute("PRAGMA writable_schema = ON")
+            connection.execute("UPDATE sqlite_schema SET sql = ? WHERE name = 'jobs_unfinished'", [written])
+        for _ in range(2):
+            with program.daemon(data=folder) as daemon:
+                assert daemon.get(place).json() == ended
+        code, said, errors = program.run("check-db", "--data", folder)
+        assert code == 1 and "jobs_unfinished" in said + errors, (code, said, errors)
+
+
 def test_a_changed_summary_is_no_answer():
     """The job and a POST of the same scene are refused with the result's id; after its deletion the scene is computed again."""
     with tempfile.TemporaryDirectory() as folder:
