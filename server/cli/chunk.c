@@ -116,6 +116,8 @@ static int chunk_run_child(ChunkMaking *making) {
         return CHUNK_AGAIN;
     FILE *in = fdopen(ends[0], "r"), *out = fdopen(ends[1], "w");
     const pid_t child = in != NULL && out != NULL ? fork() : -1;
+    if (child < 0)
+        fprintf(stderr, "impactd chunk: no run can be started: %s\n", strerror(errno));
     if (child == 0) {
         (void)signal(SIGTERM, SIG_DFL);
         (void)fclose(in);
@@ -131,6 +133,8 @@ static int chunk_run_child(ChunkMaking *making) {
     while (child > 0 && waitpid(child, &state, 0) < 0 && errno == EINTR)
         ;
     chunk_child = 0;
+    if (making->bytes.is_failed)
+        fprintf(stderr, "impactd chunk: no memory for a chunk\n");
     if (child < 0 || making->bytes.is_failed)
         return CHUNK_AGAIN;
     if (WIFEXITED(state))

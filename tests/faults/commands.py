@@ -31,6 +31,15 @@ TIMEOUT = 60  # [s]
 WORDS = {"allocations": ("memory",), "stacks": ("memory",), "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing"), 
          "ENOSPC": ("No space", "no room", "cannot open", "could not be opened", "unable to open"), "short": ("",)}
 SERVE = ("serve", "--listen", "127.0.0.1:0", "--workers", "1", "--data", "{}/data")
+# A study in a folder, as a cluster's tasks find it.
+SCENE = {"structure": {"kind": "sdof", "mass": 1.35, "stiffness": 865},
+         "dampers": [{"mass": 0.1, "clearance": 0.01, "buffer": {"restitution": 0.6, "contact_time": 0.02}}],
+         "excitation": {"kind": "random", "band": [0, 15], "rms": 1, "seed": 3}, "duration": 2, "sample_rate": 100,
+         "output": {"channels": ["displacement"], "psd": {"channels": ["displacement"], "segment": 64}},
+         "study": {"kind": "ensemble", "runs": 7, "inputs": [
+             {"pointer": "/dampers/0/mass", "distribution": "uniform", "from": 0.09, "to": 0.11}]}}
+STUDY = {"result": "r-" + 64 * "0", "members": 7, "chunks": 3, "is_strided": True, "samples": 1 << 20, "impacts": 5000, "points": 1000,
+         "steps": 1e9, "bytes": 1e9, "document_bytes": 1e9, "scene": program.json.dumps(SCENE)}
 MOTION = "PEER\nrecord\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 4, DT= .0200 SEC\n0.1 -0.2 0.3 -0.1\n"
 
 
@@ -43,6 +52,7 @@ def prepare(folder):
     daemon.start()
     try:
         assert daemon.submit(scene, wait=20).json()["status"] == "successful"
+        engine = daemon.get("/version").json()["engine"]
         code, _, said = program.run("backup", os.path.join(folder, "copy.db"), "--data", data)
         assert code == 0, said
         long = {**scene, "duration": 10, "accuracy": {"solver": "rk4", "step": 1e-4}}
@@ -51,7 +61,10 @@ def prepare(folder):
             assert daemon.submit(long, headers={"Prefer": "respond-async"}).status == 202
     finally:
         daemon.kill()
-    for name, text in (("motion.AT2", MOTION), ("scene.json", program.json.dumps(scene))):
+    for name in ("records", "chunks"):
+        os.makedirs(os.path.join(folder, "study", name))
+    for name, text in (("motion.AT2", MOTION), ("scene.json", program.json.dumps(scene)),
+                       ("study/study", program.json.dumps({"engine": engine, **STUDY}))):
         with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
             file.write(text)
 
@@ -79,8 +92,8 @@ def count(rows):
 class Case:
     """A command in a folder of its own; `before` and `after` are the states of the file that it writes."""
 
-    def __init__(self, *arguments, target=None, without=()):
-        self.arguments, self.target, self.without = arguments, target, without
+    def __init__(self, *arguments, target=None, without=(), codes=(1,)):
+        self.arguments, self.target, self.without, self.codes = arguments, target, without, codes
 
     def reset(self, template, folder):
         shutil.rmtree(folder, ignore_errors=True)
@@ -146,6 +159,8 @@ CASES = {
     "check": Case("check-db", "--data", "{}/data", target="data/impactd.db"),
     "import": Case("import", "{}/motion.AT2", "-o", "{}/motion.json", target="motion.json"),
     "run": Case("run", "{}/scene.json", "-o", "{}/series.npy", target="series.npy"),
+    # 74: the folder is full, 75: another attempt may succeed.
+    "chunk": Case("chunk", "{}/study", "1", target="study/chunks/1", codes=(1, 74, 75)),
 }
 
 
@@ -205,7 +220,7 @@ class Campaign:
             self.fault("crashed", f"{where}: {code}: {said[-3000:]}")
         elif code == 0:
             self.outcomes["done"] += 1
-        elif code != 1 or not any(word in said for word in WORDS[self.kind]) or "is damaged, or" in said:
+        elif code not in self.case.codes or not any(word in said for word in WORDS[self.kind]) or "is damaged, or" in said:
             self.fault("unclear", f"{where}: {code}: {said}")
         else:
             self.outcomes["refused"] += 1
