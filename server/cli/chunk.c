@@ -30,7 +30,6 @@ typedef struct ChunkMaking {
     ChunkPlan plan;
     ChunkKey key;
     StudyRequest request;
-    SimulationLimits limits; // the study refers to them
     Variant *answer;
     StudyWork *work;
     size_t chunk, count, made; // members
@@ -47,10 +46,10 @@ static void chunk_stop(int signal) {
     _exit(CHUNK_AGAIN);
 }
 
-// The child: makes the members from `made` on and writes them to the pipe. Returns its exit code.
-static int chunk_make_members(const ChunkMaking *making, FILE *pipe) {
+// The child: makes the members from `made` on and writes them to the pipe. False: not all.
+static bool chunk_make_members(const ChunkMaking *making, FILE *pipe) {
     Workspace workspace = {0};
-    const StudyTools tools = {.limits = &making->limits, .workspace = &workspace};
+    const StudyTools tools = {.limits = &making->plan.limits, .workspace = &workspace};
     Problem problem;
     for (size_t i = making->made; i < making->count; i++) {
         const size_t member = chunk_plan_member(&making->plan, making->chunk, i);
@@ -59,48 +58,39 @@ static int chunk_make_members(const ChunkMaking *making, FILE *pipe) {
         problem_clear(&problem);
         if (study_part_make(making->work, member, &tools, &part, &problem) != STATUS_OK) {
             fprintf(stderr, "impactd chunk: %s\n", problem.detail);
-            return CHUNK_AGAIN;
+            return false;
         }
         part_blob_write(&bytes, part);
         const uint64_t size = bytes.count;
         if (bytes.is_failed || fwrite(&size, sizeof size, 1, pipe) != 1 ||
             fwrite(bytes.at, 1, bytes.count, pipe) != bytes.count || fflush(pipe) != 0)
-            return CHUNK_AGAIN;
+            return false;
         bytes_clear(&bytes);
         study_part_free(making->work, part);
     }
-    return CHUNK_MADE;
+    return true;
 }
 
-// Takes what the child writes, member by member; of one that it did not write whole, nothing.
+// Takes what the child writes, to its end; of a member that it did not write whole, nothing.
 static void chunk_take_members(ChunkMaking *making, FILE *pipe) {
-    uint64_t size;
-    while (making->made < making->count && fread(&size, sizeof size, 1, pipe) == 1) {
-        char *part = malloc((size_t)size + 1);
-        const bool is_whole = part != NULL && fread(part, 1, (size_t)size, pipe) == size;
-        if (is_whole) {
-            chunk_add(&making->bytes, part, (size_t)size);
-            making->made++;
-        }
-        free(part);
-        if (!is_whole)
-            return;
-    }
+    char block[1 << 16];
+    const char *part;
+    size_t size, at = making->bytes.count;
+    for (size_t count; (count = fread(block, 1, sizeof block, pipe)) > 0;)
+        bytes_put(&making->bytes, block, count);
+    ChunkFile written = {.bytes = making->bytes, .at = at};
+    while (!making->bytes.is_failed && chunk_next(&written, &part, &size))
+        making->made++;
+    making->bytes.count = making->bytes.is_failed ? 0 : written.at;
 }
 
 // The run in which the program crashed.
 static void chunk_add_crash(ChunkMaking *making, int signal) {
     char why[160];
-    StudyPart part = {.run = {.status = STATUS_INTERNAL, .why = why, .steps = (double)NAN}};
-    Bytes bytes = {0};
     snprintf(why, sizeof why, "the program crashed in this run: %s", strsignal(signal));
     fprintf(stderr, "impactd chunk: member %zu: %s\n",
             chunk_plan_member(&making->plan, making->chunk, making->made), why);
-    (void)fields_default(summary_fields, &part.run.summary);
-    (void)fields_default(reduction_fields, &part.run.reduction);
-    part_blob_write(&bytes, &part);
-    chunk_add(&making->bytes, bytes.at, bytes.count);
-    bytes_clear(&bytes);
+    chunk_add_failure(&making->bytes, STATUS_INTERNAL, why);
     making->made++;
 }
 
@@ -109,92 +99,78 @@ static bool signal_is_crash(int signal) {
            signal == SIGABRT;
 }
 
-// One child, to its end. Returns an exit code; CHUNK_MADE also after a crash, which is a member.
-static int chunk_run_child(ChunkMaking *making) {
-    int ends[2], state;
+// One child, to its end. A crash is a member. False: another attempt may succeed.
+static bool chunk_run_child(ChunkMaking *making) {
+    int ends[2], state = 0;
     if (pipe(ends) != 0)
-        return CHUNK_AGAIN;
+        return false;
     FILE *in = fdopen(ends[0], "r"), *out = fdopen(ends[1], "w");
     const pid_t child = in != NULL && out != NULL ? fork() : -1;
-    if (child < 0)
+    if (child < 0) {
         fprintf(stderr, "impactd chunk: no run can be started: %s\n", strerror(errno));
+        return false;
+    }
     if (child == 0) {
         (void)signal(SIGTERM, SIG_DFL);
         (void)fclose(in);
-        _exit(chunk_make_members(making, out));
+        _exit(chunk_make_members(making, out) ? 0 : 1);
     }
     chunk_child = (sig_atomic_t)child;
-    if (out != NULL)
-        (void)fclose(out);
-    if (child > 0)
-        chunk_take_members(making, in);
-    if (in != NULL)
-        (void)fclose(in);
-    while (child > 0 && waitpid(child, &state, 0) < 0 && errno == EINTR)
+    (void)fclose(out);
+    chunk_take_members(making, in);
+    (void)fclose(in);
+    while (waitpid(child, &state, 0) < 0 && errno == EINTR)
         ;
     chunk_child = 0;
     if (making->bytes.is_failed)
         fprintf(stderr, "impactd chunk: no memory for a chunk\n");
-    if (child < 0 || making->bytes.is_failed)
-        return CHUNK_AGAIN;
-    if (WIFEXITED(state))
-        return WEXITSTATUS(state);
-    if (!signal_is_crash(WTERMSIG(state)))
-        return CHUNK_AGAIN;
-    if (making->made < making->count)
+    const bool is_crash = WIFSIGNALED(state) && signal_is_crash(WTERMSIG(state));
+    if (is_crash && making->made < making->count)
         chunk_add_crash(making, WTERMSIG(state));
-    return CHUNK_MADE;
+    return (is_crash || (WIFEXITED(state) && WEXITSTATUS(state) == 0)) && !making->bytes.is_failed;
 }
 
-// The study begun as everywhere; exit code.
-static int chunk_open(ChunkMaking *making, Problem *problem) {
-    Status status =
-        chunk_folder_read(making->folder, &making->plan, &making->key, &making->request, problem);
-    if (status != STATUS_OK)
-        return status == STATUS_INVALID ? CHUNK_BAD : CHUNK_AGAIN;
-    if (making->request.study == NULL || making->chunk >= making->plan.chunks) {
-        (void)problem_set(problem, STATUS_INVALID, "there is no chunk %zu", making->chunk);
-        return CHUNK_BAD;
-    }
-    making->limits = chunk_plan_limits(&making->plan);
+// The study begun as everywhere.
+static Status chunk_open(ChunkMaking *making, Problem *problem) {
+    ChunkPlan *plan = &making->plan;
     Workspace workspace = {0};
     const StudyTools tools = {
-        .limits = &making->limits, .workspace = &workspace, .is_validated = true};
-    status = study_begin(making->request.study, &making->request.simulation, &tools,
-                         &making->answer, &making->work, problem);
+        .limits = &plan->limits, .workspace = &workspace, .is_validated = true};
+    TRY(chunk_folder_read(making->folder, plan, &making->key, &making->request, problem));
+    if (making->request.study == NULL || making->chunk >= plan->chunks)
+        return problem_set(problem, STATUS_INVALID, "there is no chunk %zu", making->chunk);
+    const Status status = study_begin(making->request.study, &making->request.simulation, &tools,
+                                      &making->answer, &making->work, problem);
     workspace_clear(&workspace);
-    if (status != STATUS_OK)
-        return status == STATUS_NO_MEMORY ? CHUNK_AGAIN : CHUNK_BAD;
-    if (making->work->members != making->plan.members) {
-        (void)problem_set(problem, STATUS_INVALID, "the study has %zu members here, not %llu",
-                          making->work->members, (unsigned long long)making->plan.members);
-        return CHUNK_BAD;
-    }
-    making->count = chunk_plan_count(&making->plan, making->chunk);
-    return CHUNK_MADE;
+    TRY(status);
+    making->count = chunk_plan_count(plan, making->chunk);
+    return making->work->members == plan->members
+               ? STATUS_OK
+               : problem_set(problem, STATUS_INVALID, "the study has %zu members here, not %llu",
+                             making->work->members, (unsigned long long)plan->members);
 }
 
-static int chunk_make(ChunkMaking *making, Problem *problem) {
+static Status chunk_make(ChunkMaking *making, Problem *problem) {
     ChunkFile made = {.at = 0};
-    int code = chunk_open(making, problem);
-    if (code != CHUNK_MADE)
-        return code;
+    TRY(chunk_open(making, problem));
     const Status found =
-        chunk_read(making->folder, &making->plan, &making->key, making->chunk, &made, problem);
+        chunk_read(making->folder, &making->plan, &making->key, making->chunk, &made, NULL);
     bytes_clear(&made.bytes);
     if (found == STATUS_OK) // by another copy of this task
-        return CHUNK_MADE;
-    problem_clear(problem);
+        return STATUS_OK;
     chunk_begin(&making->bytes, &making->key, making->chunk, making->count);
-    while (code == CHUNK_MADE && making->made < making->count)
-        code = chunk_run_child(making);
-    if (code != CHUNK_MADE) {
-        (void)problem_set(problem, STATUS_IO, "stopped after %zu of %zu runs", making->made,
-                          making->count);
-        return code;
-    }
-    const Status status = chunk_save(making->folder, making->chunk, &making->bytes, problem);
-    return status == STATUS_OK ? CHUNK_MADE : status == STATUS_FULL ? CHUNK_FULL : CHUNK_AGAIN;
+    while (making->made < making->count)
+        if (!chunk_run_child(making))
+            return problem_set(problem, STATUS_IO, "stopped after %zu of %zu runs", making->made,
+                               making->count);
+    return chunk_save(making->folder, making->chunk, &making->bytes, problem);
+}
+
+static int chunk_exit(Status status) {
+    return status == STATUS_OK                                         ? CHUNK_MADE
+           : status == STATUS_FULL                                     ? CHUNK_FULL
+           : status == STATUS_NOT_FOUND || status_is_transient(status) ? CHUNK_AGAIN
+                                                                       : CHUNK_BAD;
 }
 
 static int chunk_run(const Command *self, void *item, const Options *options, Problem *problem) {
@@ -211,7 +187,7 @@ static int chunk_run(const Command *self, void *item, const Options *options, Pr
     making.chunk += task;
     (void)signal(SIGTERM, chunk_stop);
     (void)signal(SIGPIPE, SIG_IGN);
-    const int code = chunk_make(&making, problem);
+    const int code = chunk_exit(chunk_make(&making, problem));
     if (code != CHUNK_MADE)
         fprintf(stderr, "impactd chunk %zu: %s\n", making.chunk, problem->detail);
     study_free(making.work);

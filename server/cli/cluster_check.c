@@ -1,20 +1,19 @@
-// impactd check --executor slurm: whether a cluster can make studies, step by step.
+// impactd check --executor slurm: whether a cluster can make studies, step by step. The last one is
+// a small study, made as the server's are.
 #include <errno.h>
-#include <limits.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "server/cli/command.h"
-#include "server/jobs/chunk_file.h"
 #include "server/jobs/jobs.h"
 #include "server/jobs/slurm.h"
-#include "server/util/clock.h"
+#include "server/jobs/sweep.h"
 
-enum { WAIT_S = 120 };
+enum { WAIT_S = 120, END_S = 10, PER_S = 20 };
+static const struct timespec trial_pause = {0, 1000000000 / PER_S};
 
 const char *const executor_names[] = {"threads", "slurm", NULL};
 
@@ -24,128 +23,112 @@ static const char trial[] =
     "0.02}}], \"excitation\": {\"kind\": \"free\", \"displacement\": 0.015}, \"duration\": 1, "
     "\"sample_rate\": 100, "
     "\"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/dampers/0/clearance\", "
-    "\"values\": [0.01, 0.02]}]}}";
+    "\"values\": [0.01]}]}}";
 
 Status cluster_check_folder(const char *shared, Problem *problem) {
     struct stat facts;
-    if (shared == NULL || shared[0] != '/')
+    if (shared == NULL || shared[0] != '/' || strpbrk(shared, "%\\\n") != NULL)
         return problem_add(problem, STATUS_USAGE, "--shared",
-                           "must be the absolute path of a folder that this machine and all nodes "
-                           "see, for --executor slurm");
+                           "must be the absolute path, without %% and \\, of a folder that this "
+                           "machine and all nodes see, for --executor slurm");
     if (stat(shared, &facts) != 0)
         return problem_add(problem, STATUS_USAGE, "--shared", "%.300s: %s", shared,
                            strerror(errno));
-    if (!S_ISDIR(facts.st_mode) || access(shared, W_OK) != 0)
+    if (!S_ISDIR(facts.st_mode) || access(shared, W_OK) != 0 || facts.st_uid != geteuid() ||
+        (facts.st_mode & (S_IWGRP | S_IWOTH)) != 0)
         return problem_add(problem, STATUS_USAGE, "--shared",
-                           "%.300s must be a folder that this user may write to", shared);
-    if ((facts.st_mode & (S_IWGRP | S_IWOTH)) != 0)
-        return problem_add(problem, STATUS_USAGE, "--shared",
-                           "others may write to %.300s, and thus change results; chmod go-w it",
+                           "%.300s must be a folder of this user, to which no other may write and "
+                           "thus change results: chown it, chmod 700 it",
                            shared);
     return STATUS_OK;
 }
 
-static void step_print(const char *what, const char *format, const char *value) {
-    printf("ok    %-12s ", what);
-    printf(format, value);
-    printf("\n");
-    (void)fflush(stdout);
+// Whether the row is there, or else why not.
+static Status trial_result(Db *db, const char *result, Problem *problem) {
+    SweepView view;
+    Status status = sweep_view_load(db, result, false, true, &view, problem);
+    if (status == STATUS_OK && view.sweep->table.failures.count > 0)
+        status = problem_set(problem, STATUS_IO, "a node did not make a study: %s",
+                             view.sweep->table.failures.at[0].detail);
+    sweep_view_clear(&view);
+    return status;
 }
 
-// The file that the node made, while it is waited for.
-static Status trial_wait(const char *folder, const ChunkPlan *plan, const ChunkKey *key,
-                         const char *name, Problem *problem) {
-    const int64_t end_ns = clock_monotonic_ns() + (int64_t)WAIT_S * 1000000000;
-    const struct timespec pause = {1, 0};
-    char shown[80] = "";
-    for (bool has_ended = false;;) {
-        ChunkFile file;
-        SlurmTasks tasks;
-        const Status found = chunk_read(folder, plan, key, 0, &file, NULL);
-        bytes_clear(&file.bytes);
-        if (found == STATUS_OK)
-            return STATUS_OK;
-        if (found != STATUS_NOT_FOUND)
-            return problem_set(problem, found, "the file that the node wrote is not right");
-        if (has_ended)
-            return problem_set(
-                problem, STATUS_IO,
-                "the node wrote no file that is seen here (%s); %.300s/log/0 has what "
-                "it printed. Is %s there at the same path, and the folder too?",
-                shown, folder, "impactd");
-        TRY(slurm_tasks(name, &tasks, problem));
-        const SlurmTask *task = tasks.count > 0 ? &tasks.at[0] : NULL;
-        has_ended = task == NULL || task->state == SLURM_ENDED;
-        text_fit(shown, sizeof shown, task != NULL ? task->reason : "Slurm does not know the job");
-        free(tasks.at);
-        if (clock_monotonic_ns() > end_ns)
-            return problem_set(problem, STATUS_TIMEOUT, "the job did not run within %d s: %s",
-                               WAIT_S, shown);
-        (void)nanosleep(&pause, NULL);
+// The job to its end, or cancelled.
+static Status trial_wait(JobManager *manager, Db *db, Job *job, Problem *problem) {
+    char shown[240] = "it has not begun";
+    JobView view;
+    for (int i = 0; i < WAIT_S * PER_S; i++, nanosleep(&trial_pause, NULL)) {
+        Status status = job_view(job, &view);
+        const bool is_final = job_state_is_final(view.row.state);
+        if (view.cluster.reason[0] != '\0')
+            text_fit(shown, sizeof shown, view.cluster.reason);
+        if (status == STATUS_OK && view.row.state == JOB_FAILED)
+            status = problem_set(problem, STATUS_IO, "%s", shown);
+        else if (status == STATUS_OK && is_final)
+            status = trial_result(db, view.row.result, problem);
+        else if (i + 1 == WAIT_S * PER_S &&
+                 jobs_cancel(manager, view.row.id, &job, NULL) == STATUS_OK)
+            job_unref(job);
+        job_view_clear(&view);
+        if (status != STATUS_OK || is_final)
+            return status;
     }
+    return problem_set(problem, STATUS_TIMEOUT, "no node made a study within %d s: %s", WAIT_S,
+                       shown);
 }
 
-// A study of two runs, made by a node.
-static Status trial_run(const ClusterSettings *cluster, const char *folder, Problem *problem) {
-    const SimulationLimits limits = {.samples = 1 << 20,
-                                     .impacts = 1 << 20,
-                                     .steps = 1e9,
-                                     .bytes = SIMULATION_BYTES,
-                                     .document_bytes = DOCUMENT_BYTES};
-    char program[PATH_MAX] = "", name[64], result[72];
+static Status trial_run(const ClusterSettings *cluster, Problem *problem) {
+    const JobManagerSettings settings = {.workers = 1,
+                                         .queue_most = 1,
+                                         .limits = {.samples = 1 << 20,
+                                                    .impacts = 1 << 20,
+                                                    .steps = 1e9,
+                                                    .bytes = SIMULATION_BYTES,
+                                                    .document_bytes = DOCUMENT_BYTES},
+                                         .cluster = *cluster};
+    const Submission submission = {.text = trial, .size = strlen(trial)};
     Db *db = NULL;
-    StudyRequest request;
-    Warnings warnings = {NULL, 0};
-    ChunkKey key;
-    ChunkPlan plan = {.engine = NULL};
-    TRY(db_open(NULL, &db, problem));
-    Status status = jobs_prepare(db, trial, strlen(trial), &limits, &request, &warnings, problem);
+    JobManager *manager = NULL;
+    Job *job = NULL;
+    Status status = db_open(NULL, &db, problem);
     if (status == STATUS_OK)
-        status = jobs_result_id(&request, result, problem);
+        status = jobs_open(db, &settings, &manager, problem);
     if (status == STATUS_OK)
-        status = chunk_plan_make(&plan, &request, result, &limits, problem);
-    plan.members = 2;
-    plan.chunks = 1;
-    plan.is_strided = true;
+        status = jobs_submit(manager, &submission, &job, problem);
     if (status == STATUS_OK)
-        status = chunk_folder_make(folder, &plan, &request, db, &key, problem);
-    if (status == STATUS_OK)
-        status = slurm_make_start(folder, problem);
-    (void)!readlink("/proc/self/exe", program, sizeof program - 1);
-    snprintf(name, sizeof name, "impactd-check-%ld", (long)getpid());
-    const SlurmSettings slurm = {cluster->partition, &cluster->options};
-    const SlurmArray array = {.name = name, .folder = folder, .program = program, .tasks = "0"};
-    if (status == STATUS_OK)
-        status = slurm_submit(&slurm, &array, problem);
-    if (status == STATUS_OK)
-        status = trial_wait(folder, &plan, &key, name, problem);
-    if (status != STATUS_OK)
-        (void)slurm_cancel(name, false, NULL);
-    chunk_plan_clear(&plan);
-    warnings_clear(&warnings);
-    study_request_clear(&request);
+        status = trial_wait(manager, db, job, problem);
+    job_unref(job);
+    // The study's folder is deleted when Slurm has none of its tasks.
+    for (int i = 0; job != NULL && i < END_S * PER_S && rmdir(cluster->shared) != 0; i++)
+        (void)nanosleep(&trial_pause, NULL);
+    jobs_close(manager);
     db_close(db);
     return status;
 }
 
 Status cluster_check(const ClusterSettings *cluster, Problem *problem) {
     const SlurmSettings slurm = {cluster->partition, &cluster->options};
+    ClusterSettings own = *cluster;
     SlurmFacts facts;
-    char folder[PATH_MAX], log[PATH_MAX], slots[24];
+    char folder[2100];
     TRY(cluster_check_folder(cluster->shared, problem));
-    step_print("folder", "%s: only this user may write to it", cluster->shared);
+    printf("ok    folder       %s: only this user may write to it\n", cluster->shared);
     TRY(slurm_facts(&slurm, &facts, problem));
     if (facts.reason[0] != '\0')
         return problem_set(problem, STATUS_BUSY, "no node of the partition takes jobs: %s",
                            facts.reason);
-    snprintf(slots, sizeof slots, "%zu", facts.slots);
-    step_print("Slurm", "answers; %s processors take jobs", slots);
-    snprintf(folder, sizeof folder, "%.2000s/check-%ld", cluster->shared, (long)getpid());
-    const Status status = trial_run(cluster, folder, problem);
-    snprintf(log, sizeof log, "%.2100s/log/0", folder);
-    if (status == STATUS_OK || access(log, F_OK) != 0) // else it has what is to be read
-        chunk_folder_remove(folder);
+    printf("ok    Slurm        answers; %zu processors take jobs\n", facts.slots);
+    (void)fflush(stdout);
+    snprintf(folder, sizeof folder, "%s/check-%ld", cluster->shared, (long)getpid());
+    if (mkdir(folder, 0700) != 0)
+        return problem_set(problem, STATUS_IO, "%.300s: %s", folder, strerror(errno));
+    own.shared = own.data = folder;
+    own.poll_seconds = 0.5;
+    own.attempts = 1;
+    const Status status = trial_run(&own, problem);
+    (void)rmdir(folder);
     TRY(status);
-    step_print("a chunk", "was made on a node with the engine %s", engine_version);
+    printf("ok    a study      was made by a node with the engine %s\n", engine_version);
     return STATUS_OK;
 }

@@ -354,7 +354,8 @@ static Status serve_open_jobs(App *app, const ServeSettings *settings, Problem *
                     .partition = settings->partition,
                     .options = settings->sbatch_option,
                     .seconds = settings->cluster_seconds,
-                    .poll_seconds = settings->cluster_poll}};
+                    .poll_seconds = settings->cluster_poll,
+                    .attempts = 5}};
     return jobs_open(app->db, &job_settings, &app->manager, problem);
 }
 

@@ -25,6 +25,8 @@ Status db_open(const char *directory, Db **db, Problem *problem);
 // the folder only where the database has to be made or migrated.
 Status db_open_beside(const char *directory, Db **db, Problem *problem);
 void db_close(Db *db);
+// Makes new names in a folder durable.
+Status data_dir_sync(const char *directory, Problem *problem);
 bool db_is_private(const Db *db); // in memory, gone with the program
 
 // A write that is not waited for. Its owner keeps it, and what it borrows, until `done` was called:

@@ -14,8 +14,6 @@ Status data_dir_make(const char *directory, Problem *problem);
 // process has it.
 Status data_dir_lock(const char *directory, int *lock, Problem *problem);
 void data_dir_unlock(int lock); // below 0: nothing
-// Makes new names in `directory` durable.
-Status data_dir_sync(const char *directory, Problem *problem);
 
 // check.c: SQLite's own check of the file, then references, then the checksums of all rows.
 // STATUS_IO: there is damage.

@@ -1,9 +1,11 @@
+#define _DEFAULT_SOURCE // strsep
 #include "server/jobs/chunk_file.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +20,7 @@
 #include "server/json/encode.h"
 #include "server/json/parse.h"
 
-enum { SCENE_BYTES = 64 << 20, FILE_BYTES = 1 << 30 };
+enum { SCENE_BYTES = 64 << 20, FILE_BYTES = 1 << 30, RECORDS = 4096 };
 
 static const char chunk_magic[8] = {'i', 'm', 'p', 'a', 'c', 't', 'c', '1'};
 
@@ -29,19 +31,26 @@ typedef struct ChunkHead {
 } ChunkHead;
 
 // clang-format off
+static const Field record_fields[] = {
+    FIELD_TEXT(ChunkRecord, name, RECORD_NAME_SIZE - 1, PRESENCE_REQUIRED, 0, "as the scene names it"),
+    FIELD_REAL(ChunkRecord, interval, "s", ABOVE(0), REQUIRED, "between samples"),
+    FIELD_REALS(ChunkRecord, samples, "m/s^2", ANY, RECORD_SAMPLES, PRESENCE_REQUIRED, "of the ground"),
+    FIELD_END,
+};
+
 static const Field plan_fields[] = {
     FIELD_TEXT(ChunkPlan, engine, 64, PRESENCE_REQUIRED, 0, "version of the engine"),
-    FIELD_TEXT(ChunkPlan, result, 72, PRESENCE_REQUIRED, 0, "id of the result"),
     FIELD_COUNT(ChunkPlan, members, NULL, WITHIN(1, 1e9), REQUIRED, "of the study"),
     FIELD_COUNT(ChunkPlan, chunks, NULL, WITHIN(1, 1e6), REQUIRED, "that they are made in"),
     FIELD_FLAG(ChunkPlan, is_strided, false, "chunk i has the members i, i + chunks ..."),
-    FIELD_COUNT(ChunkPlan, samples, NULL, AT_MIN(0), REQUIRED, "limit of each run, as the next"),
-    FIELD_COUNT(ChunkPlan, impacts, NULL, AT_MIN(0), REQUIRED, "listed"),
-    FIELD_COUNT(ChunkPlan, points, NULL, AT_MIN(0), REQUIRED, "of a sweep"),
-    FIELD_REAL(ChunkPlan, steps, NULL, AT_MIN(0), REQUIRED, "predicted"),
-    FIELD_REAL(ChunkPlan, bytes, "B", AT_MIN(0), REQUIRED, "of memory"),
-    FIELD_REAL(ChunkPlan, document_bytes, "B", AT_MIN(0), REQUIRED, "of spectra"),
+    FIELD_COUNT(ChunkPlan, limits.samples, NULL, AT_MIN(0), REQUIRED, "limit of each run, as the next"),
+    FIELD_COUNT(ChunkPlan, limits.impacts, NULL, AT_MIN(0), REQUIRED, "listed"),
+    FIELD_COUNT(ChunkPlan, limits.points, NULL, AT_MIN(0), REQUIRED, "of a sweep"),
+    FIELD_REAL(ChunkPlan, limits.steps, NULL, AT_MIN(0), REQUIRED, "predicted"),
+    FIELD_REAL(ChunkPlan, limits.bytes, "B", AT_MIN(0), REQUIRED, "of memory"),
+    FIELD_REAL(ChunkPlan, limits.document_bytes, "B", AT_MIN(0), REQUIRED, "of spectra"),
     FIELD_TEXT(ChunkPlan, scene, SCENE_BYTES, PRESENCE_REQUIRED, 0, "canonical JSON"),
+    FIELD_LIST(ChunkPlan, records, record_fields, RECORDS, PRESENCE_OPTIONAL, "that the scene names"),
     FIELD_END,
 };
 // clang-format on
@@ -50,30 +59,35 @@ void chunk_plan_clear(ChunkPlan *plan) {
     fields_clear(plan_fields, plan);
 }
 
-Status chunk_plan_make(ChunkPlan *plan, const StudyRequest *request, const char *result,
-                       const SimulationLimits *limits, Problem *problem) {
-    Bytes scene = {0};
-    *plan = (ChunkPlan){.samples = limits->samples,
-                        .impacts = limits->impacts,
-                        .points = limits->points,
-                        .steps = limits->steps,
-                        .bytes = limits->bytes,
-                        .document_bytes = limits->document_bytes};
-    document_scene(&scene, request);
-    plan->scene = bytes_take(&scene, NULL);
-    const Status all[] = {status_made(plan->scene != NULL),
-                          text_copy(engine_version, &plan->engine),
-                          text_copy(result, &plan->result)};
-    return study_result(status_first(all, COUNT(all)), problem);
+static Status plan_add_record(ChunkPlan *plan, const char *name, Db *db, Problem *problem) {
+    NamedRecord *named;
+    TRY(db_record_named(db, name, &named, problem));
+    ChunkRecord *record = list_append(&plan->records, sizeof *record);
+    if (record != NULL)
+        *record = (ChunkRecord){.name = strdup(name), .interval = named->interval};
+    const bool is_made = record != NULL && record->name != NULL &&
+                         reals_allocate(&record->samples, named->samples.count);
+    if (is_made)
+        memcpy(record->samples.at, named->samples.at, named->samples.count * sizeof(double));
+    refcount_unref(&named->shared);
+    return study_result(status_made(is_made), problem);
 }
 
-SimulationLimits chunk_plan_limits(const ChunkPlan *plan) {
-    return (SimulationLimits){.samples = (size_t)plan->samples,
-                              .impacts = (size_t)plan->impacts,
-                              .points = (size_t)plan->points,
-                              .steps = plan->steps,
-                              .bytes = plan->bytes,
-                              .document_bytes = plan->document_bytes};
+Status chunk_plan_make(ChunkPlan *plan, const StudyRequest *request, Db *db,
+                       const SimulationLimits *limits, Problem *problem) {
+    Bytes scene = {0}, names = {0};
+    *plan = (ChunkPlan){.limits = *limits};
+    document_scene(&scene, request);
+    references_write(&names, request, false);
+    plan->engine = strdup(engine_version);
+    const bool is_made = plan->engine != NULL && !names.is_failed;
+    plan->scene = bytes_take(&scene, NULL);
+    Status status = study_result(status_made(is_made && plan->scene != NULL), problem);
+    char *rest = names.at, *line;
+    while (status == STATUS_OK && (line = strsep(&rest, "\n")) != NULL && *line != '\0')
+        status = plan_add_record(plan, strchr(line, ':') + 1, db, problem); // "record:elcentro"
+    bytes_clear(&names);
+    return status;
 }
 
 static size_t chunk_plan_each(const ChunkPlan *plan) {
@@ -99,51 +113,26 @@ size_t chunk_plan_member(const ChunkPlan *plan, size_t chunk, size_t place) {
 static Status file_fault(Problem *problem, const char *path, const char *what) {
     const int error = errno;
     return problem_set(problem, error == ENOSPC || error == EDQUOT ? STATUS_FULL : STATUS_IO,
-                       "%.300s cannot be %s: %s", path, what, strerror(error));
+                       "%s: %.300s cannot be %s", strerror(error), path, what);
 }
 
-static Status file_folder(const char *path, Problem *problem) {
-    return mkdir(path, 0700) == 0 || errno == EEXIST ? STATUS_OK
-                                                     : file_fault(problem, path, "made");
-}
-
-static bool file_write_all(int file, const char *bytes, size_t count) {
-    while (count > 0) {
-        const ssize_t written = write(file, bytes, count);
-        if (written < 0 && errno != EINTR)
-            return false;
-        bytes += written > 0 ? written : 0;
-        count -= written > 0 ? (size_t)written : 0;
-    }
-    return true;
-}
-
-static void file_sync_folder(const char *folder) {
-    const int file = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (file < 0)
-        return;
-    (void)fsync(file);
-    (void)close(file);
-}
-
-// FOLDER/PART/NAME, whole and on the disk, or not at all.
-static Status file_put(const char *folder, const char *part, const char *name, const Bytes *bytes,
-                       Problem *problem) {
+Status chunk_folder_put(const char *folder, const char *name, const Bytes *bytes,
+                        Problem *problem) {
     char path[PATH_MAX], fresh[PATH_MAX], host[64] = "";
     (void)gethostname(host, sizeof host - 1);
-    snprintf(path, sizeof path, "%.3000s%s%.80s", folder, part, name);
+    snprintf(path, sizeof path, "%.3000s/%.80s", folder, name);
     snprintf(fresh, sizeof fresh, "%.3800s.%s.%ld.part", path, host, (long)getpid());
-    const int file = open(fresh, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    if (file < 0)
+    FILE *file = fopen(fresh, "we");
+    if (file == NULL)
         return file_fault(problem, fresh, "made");
-    const bool is_written = file_write_all(file, bytes->at, bytes->count) && fsync(file) == 0;
+    const bool is_written = fwrite(bytes->at, 1, bytes->count, file) == bytes->count &&
+                            fflush(file) == 0 && fsync(fileno(file)) == 0;
     const int error = errno;
-    const bool is_closed = close(file) == 0;
+    const bool is_closed = fclose(file) == 0;
     errno = is_written ? errno : error;
     if (is_written && is_closed && rename(fresh, path) == 0) {
-        snprintf(fresh, sizeof fresh, "%.3000s%s", folder, part);
-        file_sync_folder(fresh);
-        return STATUS_OK;
+        *strrchr(path, '/') = '\0';
+        return data_dir_sync(path, problem);
     }
     const Status status = file_fault(problem, path, "written");
     (void)unlink(fresh);
@@ -153,115 +142,52 @@ static Status file_put(const char *folder, const char *part, const char *name, c
 static Status file_get(const char *path, Bytes *bytes, Problem *problem) {
     char block[1 << 16];
     ssize_t count;
-    struct stat facts;
     *bytes = (Bytes){.most = FILE_BYTES};
-    const int file = open(path, O_RDONLY | O_CLOEXEC);
+    const int file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (file < 0)
         return errno == ENOENT ? problem_set(problem, STATUS_NOT_FOUND, "there is no %.300s", path)
                                : file_fault(problem, path, "opened");
-    if (fstat(file, &facts) == 0 && S_ISREG(facts.st_mode) && facts.st_size < FILE_BYTES)
-        (void)bytes_reserve(bytes, (size_t)facts.st_size);
     while ((count = read(file, block, sizeof block)) > 0 || (count < 0 && errno == EINTR))
         if (count > 0)
             bytes_put(bytes, block, (size_t)count);
     const Status status = count == 0 ? STATUS_OK : file_fault(problem, path, "read");
     (void)close(file);
     if (status == STATUS_OK && bytes->is_failed)
-        return bytes->is_over
-                   ? problem_set(problem, STATUS_INVALID, "%.300s is too large", path)
-                   : problem_set(problem, STATUS_NO_MEMORY, "no memory for %.300s", path);
+        return problem_set(problem, bytes->is_over ? STATUS_INVALID : STATUS_NO_MEMORY,
+                           "%.300s is too large", path);
     return status;
 }
 
-static void folder_remove(const char *folder, int depth) {
-    char path[PATH_MAX];
-    DIR *list = opendir(folder);
+static void path_remove(const char *path, int depth) {
+    char inner[PATH_MAX];
     const struct dirent *entry;
+    DIR *list = unlink(path) != 0 && depth > 0 ? opendir(path) : NULL;
     while (list != NULL && (entry = readdir(list)) != NULL) {
-        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0)
-            continue;
-        snprintf(path, sizeof path, "%.3000s/%s", folder, entry->d_name);
-        if (unlink(path) != 0 && depth > 0)
-            folder_remove(path, depth - 1);
+        snprintf(inner, sizeof inner, "%.3000s/%s", path, entry->d_name);
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            path_remove(inner, depth - 1);
     }
     if (list != NULL)
         (void)closedir(list);
-    (void)rmdir(folder);
+    (void)rmdir(path);
 }
 
 void chunk_folder_remove(const char *folder) {
-    folder_remove(folder, 1);
+    path_remove(folder, 2);
 }
 
 // --- the study ---
 
-// "record:NAME" lines as references_write writes them: the next name.
-static bool records_next(const char **lines, char name[RECORD_NAME_SIZE]) {
-    static const char prefix[] = "record:";
-    const size_t length = strcspn(*lines, "\n");
-    if (length < sizeof prefix || length - sizeof prefix + 1 >= RECORD_NAME_SIZE)
-        return false;
-    memcpy(name, *lines + sizeof prefix - 1, length - sizeof prefix + 1);
-    name[length - sizeof prefix + 1] = '\0';
-    *lines += length + 1;
-    return true;
-}
-
-static Status record_put(const char *folder, Db *db, const char *name, Problem *problem) {
-    NamedRecord *named;
-    Bytes bytes = {.most = FILE_BYTES};
-    TRY(db_record_named(db, name, &named, problem));
-    bytes_put(&bytes, &named->interval, sizeof named->interval);
-    bytes_put(&bytes, named->samples.at, named->samples.count * sizeof *named->samples.at);
-    refcount_unref(&named->shared);
-    const Status status = bytes.is_failed
-                              ? problem_set(problem, STATUS_NO_MEMORY, "no memory for a record")
-                              : file_put(folder, "/records/", name, &bytes, problem);
-    bytes_clear(&bytes);
-    return status;
-}
-
-static Status record_get(const char *folder, Db *db, const char *name, Problem *problem) {
-    char path[PATH_MAX], copy[RECORD_NAME_SIZE], layout[] = "json";
-    Bytes bytes;
-    Reals samples = {NULL, 0};
-    RecordRow row = {.name = copy, .layout = layout};
+static Status record_load(const ChunkRecord *record, Db *db, Problem *problem) {
+    char layout[] = "json";
+    RecordRow row = {.name = record->name, .layout = layout, .interval = record->interval};
     bool is_there;
-    snprintf(path, sizeof path, "%.3000s/records/%s", folder, name);
-    text_fit(copy, sizeof copy, name);
-    Status status = file_get(path, &bytes, problem);
-    const size_t count = bytes.count / sizeof(double);
-    if (status == STATUS_OK && (count < 3 || bytes.count % sizeof(double) != 0))
-        status = problem_set(problem, STATUS_INVALID, "%.300s is no record", path);
-    if (status == STATUS_OK && !reals_allocate(&samples, count - 1))
-        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for a record");
-    if (status == STATUS_OK) {
-        memcpy(&row.interval, bytes.at, sizeof row.interval);
-        memcpy(samples.at, bytes.at + sizeof row.interval, samples.count * sizeof *samples.at);
-        status = record_row_measure(&row, &samples, 0);
-    }
+    Status status = record_row_measure(&row, &record->samples, 0);
     if (status == STATUS_OK)
-        status = db_record_add(db, &row, &samples, &is_there, problem);
+        status = db_record_add(db, &row, &record->samples, &is_there, problem);
     row.name = row.layout = NULL;
     record_row_clear(&row);
-    free(samples.at);
-    bytes_clear(&bytes);
-    return status;
-}
-
-// Each record of the request, put into the folder or, where `is_read`, into the database.
-static Status records_each(const char *folder, Db *db, const StudyRequest *request, bool is_read,
-                           Problem *problem) {
-    Bytes lines = {0};
-    char name[RECORD_NAME_SIZE];
-    references_write(&lines, request, false);
-    Status status =
-        lines.is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for names") : STATUS_OK;
-    for (const char *at = lines.at; status == STATUS_OK && at != NULL && records_next(&at, name);)
-        status =
-            is_read ? record_get(folder, db, name, problem) : record_put(folder, db, name, problem);
-    bytes_clear(&lines);
-    return status;
+    return study_result(status, problem);
 }
 
 // The file `study`. The plan is cleared by the caller in any case.
@@ -282,20 +208,19 @@ static Status plan_read(const char *folder, ChunkPlan *plan, ChunkKey *key, Prob
 static bool plan_is_of(const ChunkPlan *plan, const ChunkPlan *other) {
     return strcmp(plan->engine, other->engine) == 0 && strcmp(plan->scene, other->scene) == 0 &&
            plan->members == other->members && plan->is_strided == other->is_strided &&
-           (!plan->is_strided || plan->chunks == other->chunks) && plan->steps == other->steps &&
-           plan->samples == other->samples && plan->impacts == other->impacts &&
-           plan->bytes == other->bytes;
+           (!plan->is_strided || plan->chunks == other->chunks) &&
+           memcmp(&plan->limits, &other->limits, sizeof plan->limits) == 0;
 }
 
-Status chunk_folder_make(const char *folder, ChunkPlan *plan, const StudyRequest *request, Db *db,
-                         ChunkKey *key, Problem *problem) {
-    static const char *const parts[] = {"", "/records", "/chunks", "/log"};
+Status chunk_folder_make(const char *folder, ChunkPlan *plan, ChunkKey *key, Problem *problem) {
+    static const char *const parts[] = {"", "/chunks", "/log"};
     char path[PATH_MAX];
     Bytes text = {0};
     ChunkPlan stored;
     for (size_t i = 0; i < COUNT(parts); i++) {
         snprintf(path, sizeof path, "%.3000s%s", folder, parts[i]);
-        TRY(file_folder(path, problem));
+        if (mkdir(path, 0700) != 0 && errno != EEXIST)
+            return file_fault(problem, path, "made");
     }
     const bool is_there =
         plan_read(folder, &stored, key, NULL) == STATUS_OK && plan_is_of(plan, &stored);
@@ -305,13 +230,9 @@ Status chunk_folder_make(const char *folder, ChunkPlan *plan, const StudyRequest
     if (is_there)
         return STATUS_OK;
     encode_item(&text, plan_fields, plan, WRITE_SCENE);
-    if (text.is_failed)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a study's chunks");
     sha256_sum(text.at, text.count, key->digest);
-    // The study comes last: where it is there, so are its records.
-    Status status = records_each(folder, db, request, false, problem);
-    if (status == STATUS_OK)
-        status = file_put(folder, "/", "study", &text, problem);
+    const Status status = text.is_failed ? study_result(STATUS_NO_MEMORY, problem)
+                                         : chunk_folder_put(folder, "study", &text, problem);
     bytes_clear(&text);
     return status;
 }
@@ -328,7 +249,9 @@ Status chunk_folder_read(const char *folder, ChunkPlan *plan, ChunkKey *key, Stu
                            engine_version, plan->engine);
     TRY(json_parse(plan->scene, strlen(plan->scene), study_request_fields, request, problem));
     TRY(db_open(NULL, &db, problem));
-    Status status = records_each(folder, db, request, true, problem);
+    Status status = STATUS_OK;
+    for (size_t i = 0; status == STATUS_OK && i < plan->records.count; i++)
+        status = record_load(&plan->records.at[i], db, problem);
     if (status == STATUS_OK)
         status = request_load_records(db, request, problem);
     db_close(db);
@@ -349,14 +272,24 @@ void chunk_add(Bytes *bytes, const void *part, size_t size) {
     bytes_put(bytes, part, size);
 }
 
+void chunk_add_failure(Bytes *bytes, Status status, char *why) {
+    StudyPart part = {.run = {.status = status, .why = why, .steps = (double)NAN}};
+    Bytes one = {0};
+    (void)fields_default(summary_fields, &part.run.summary);
+    (void)fields_default(reduction_fields, &part.run.reduction);
+    part_blob_write(&one, &part);
+    chunk_add(bytes, one.at, one.count);
+    bytes_clear(&one);
+}
+
 Status chunk_save(const char *folder, size_t chunk, Bytes *bytes, Problem *problem) {
     unsigned char digest[DIGEST_BYTES];
-    char name[24];
-    snprintf(name, sizeof name, "%zu", chunk);
+    char name[32];
+    snprintf(name, sizeof name, "chunks/%zu", chunk);
     sha256_sum(bytes->at, bytes->count, digest);
     bytes_put(bytes, digest, sizeof digest);
     return bytes->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for a chunk")
-                            : file_put(folder, "/chunks/", name, bytes, problem);
+                            : chunk_folder_put(folder, name, bytes, problem);
 }
 
 // Why it is not this chunk of this study; NULL: it is.

@@ -1,7 +1,7 @@
 // Members of a study that are made elsewhere: files in a folder that all machines share.
 //
-//     study        what is to be made, as JSON: the scene with its study, its limits, its chunks
-//     records/N    the ground motion N that the scene names: interval and samples
+//     study        what is to be made, as JSON: the scene with its study, the ground motions that
+//                  it names, its limits, its chunks
 //     chunks/I     what was made of chunk I
 //     log/I        what its worker said
 //
@@ -17,19 +17,29 @@
 #include "server/util/bytes.h"
 #include "server/util/sha256.h"
 
+// A ground motion that the scene names.
+typedef struct ChunkRecord {
+    char *name;
+    double interval; // [s]
+    Reals samples;   // [m/s^2]
+} ChunkRecord;
+
 typedef struct ChunkPlan {
-    char *engine, *result; // version of the engine, id of the result
-    char *scene;           // canonical JSON, with the study
+    char *engine; // its version
+    char *scene;  // canonical JSON, with the study
     uint64_t members, chunks;
     bool is_strided; // chunk i has the members i, i + chunks ..., else those that follow each other
-    uint64_t samples, impacts, points; // limits of each run: SimulationLimits
-    double steps, bytes, document_bytes;
+    SimulationLimits limits; // of each run
+    struct {
+        ChunkRecord *at;
+        size_t count;
+    } records;
 } ChunkPlan;
-// For a completed request, but for members and chunks. STATUS_NO_MEMORY.
-Status chunk_plan_make(ChunkPlan *plan, const StudyRequest *request, const char *result,
+// For a completed request with records of the database, but for members and chunks. Cleared by the
+// caller in any case.
+Status chunk_plan_make(ChunkPlan *plan, const StudyRequest *request, Db *db,
                        const SimulationLimits *limits, Problem *problem);
 void chunk_plan_clear(ChunkPlan *plan);
-SimulationLimits chunk_plan_limits(const ChunkPlan *plan);
 size_t chunk_plan_count(const ChunkPlan *plan, size_t chunk); // members of it
 size_t chunk_plan_member(const ChunkPlan *plan, size_t chunk, size_t place);
 
@@ -45,21 +55,22 @@ enum {
     CHUNK_AGAIN = 75, // another attempt may succeed
 };
 
-// Makes the folder with the study and the records of the completed request, where they are not
-// there yet. A study that is there keeps its number of chunks, which the plan takes. STATUS_FULL,
-// STATUS_IO.
-Status chunk_folder_make(const char *folder, ChunkPlan *plan, const StudyRequest *request, Db *db,
-                         ChunkKey *key, Problem *problem);
+// Makes the folder with the study, where it is not there yet. A study that is there keeps its
+// number of chunks, which the plan takes. STATUS_FULL, STATUS_IO.
+Status chunk_folder_make(const char *folder, ChunkPlan *plan, ChunkKey *key, Problem *problem);
 // Reads it back: the request is complete, with its records. Both are cleared by the caller in any
 // case. STATUS_INVALID: the folder has no study of this engine.
 Status chunk_folder_read(const char *folder, ChunkPlan *plan, ChunkKey *key, StudyRequest *request,
                          Problem *problem);
-// Deletes the folder and all that is in it.
+// Writes FOLDER/NAME. STATUS_FULL, STATUS_IO.
+Status chunk_folder_put(const char *folder, const char *name, const Bytes *bytes, Problem *problem);
+// Deletes the folder and all that is in it; of a symbolic link only that.
 void chunk_folder_remove(const char *folder);
 
 // The bytes of a chunk: begin, then each part, then save.
 void chunk_begin(Bytes *bytes, const ChunkKey *key, size_t chunk, size_t count);
-void chunk_add(Bytes *bytes, const void *part, size_t size); // by part_blob_write
+void chunk_add(Bytes *bytes, const void *part, size_t size);    // by part_blob_write
+void chunk_add_failure(Bytes *bytes, Status status, char *why); // a part: a run that failed
 // STATUS_FULL, STATUS_IO.
 Status chunk_save(const char *folder, size_t chunk, Bytes *bytes, Problem *problem);
 

@@ -21,6 +21,7 @@ typedef struct ClusterSettings {
     Texts options;         // further ones for sbatch; borrowed
     double seconds;
     double poll_seconds; // between questions to Slurm, at least
+    unsigned attempts;   // at a chunk, before its runs are failed; 1: at anything
 } ClusterSettings;
 
 typedef struct JobManagerSettings {

@@ -145,15 +145,14 @@ typedef struct Worker {
 typedef struct Cluster Cluster;
 typedef struct ClusterStudy ClusterStudy;
 typedef struct StudyExecutor {
-    // Whether it makes the members of a study of this kind and predicted CPU time.
-    bool (*wants)(const Cluster *cluster, const StudyKind *kind, double seconds);
-    size_t (*slots)(Cluster *cluster); // runs at once; a guess while that is not known
+    // How many members of a study of this kind and predicted CPU time it makes at once, perhaps a
+    // guess; 0: the workers make them.
+    size_t (*slots)(Cluster *cluster, const StudyKind *kind, double seconds);
     // Prepares a begun study, of a sweep with its chunks. STATUS_FULL, STATUS_IO: not now.
-    Status (*prepare)(Cluster *cluster, struct StudyRun *run, Problem *problem);
+    Status (*prepare)(Cluster *cluster, struct StudyRun *run, size_t slots, Problem *problem);
     // With the manager's lock held, as the next: takes a prepared study, with a turn of it, to its
     // end.
     void (*take)(struct StudyRun *run);
-    void (*view)(const ClusterStudy *study, ClusterView *view);
     void (*free)(ClusterStudy *study); // NULL is fine
     void (*close)(Cluster *cluster);   // ends its thread
 } StudyExecutor;
@@ -278,6 +277,10 @@ void commit_retry_cancels(JobManager *manager);
 // Its memory is free for others.
 void task_end(Task *task);
 void jobs_call_waiting(JobManager *manager); // all that wait try again
+
+// cluster.c. Makes Slurm the executor of long studies, as the settings say. What runs there when the
+// manager is closed continues, and is taken up after the next start.
+Status cluster_open(JobManager *manager, Problem *problem);
 
 // resolve.c. Of a prepared request: drops the samples of its records for as long as it waits, and
 // loads them again, with a fault for each that is no longer there.

@@ -7,7 +7,7 @@
 
 #include "core/solve/solver.h"
 
-#include "server/jobs/cluster.h"
+#include "server/jobs/jobs_private.h"
 #include "server/jobs/study.h"
 #include "server/util/clock.h"
 #include "server/util/process.h"

@@ -1,105 +1,55 @@
+#define _DEFAULT_SOURCE // strsep
 #include "server/jobs/slurm.h"
 
-#include <errno.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "server/util/bytes.h"
-#include "server/util/subprocess.h"
+#include "server/util/process.h"
 
-enum { OUTPUT_BYTES = 64 << 20, ARGUMENTS = 64 };
+enum { OUTPUT_BYTES = 64 << 20, ARGUMENTS = 64, ARRAY_MAX = 1001 };
 static const double patience = 20;     // [s] for an answer
 static const double least_minutes = 5; // asked for a task: nodes may be busy
 
-// sbatch takes scripts alone; this one becomes the program.
-static const char script[] = "/start",
-                  script_text[] = "#!/bin/sh\nexec \"$@\" \"$SLURM_ARRAY_TASK_ID\"\n";
+const char slurm_start[] = "#!/bin/sh\nexec \"$@\" \"$SLURM_ARRAY_TASK_ID\"\n";
 
-// Words of a command line.
-typedef struct Words {
-    const char *at[ARGUMENTS];
-    size_t count;
-} Words;
-
-static void words_add(Words *words, const char *word) {
-    if (words->count + 1 < ARGUMENTS)
-        words->at[words->count++] = word;
-}
-
-// Runs a command and returns what it prints; cleared by the caller in any case.
-static Status slurm_run(const Words *words, Bytes *output, Problem *problem) {
-    *output = (Bytes){.most = OUTPUT_BYTES};
-    const Status status = subprocess_run(words->at, patience, output, problem);
-    if (status == STATUS_OK && output->at == NULL)
-        bytes_text(output, "");
-    return status;
-}
-
-Status slurm_make_start(const char *folder, Problem *problem) {
-    char path[4096];
-    snprintf(path, sizeof path, "%.3000s%s", folder, script);
-    FILE *file = fopen(path, "we");
-    const bool is_written = file != NULL && fputs(script_text, file) >= 0;
-    const bool is_closed = file != NULL && fclose(file) == 0;
-    return is_written && is_closed
-               ? STATUS_OK
-               : problem_set(problem, errno == ENOSPC ? STATUS_FULL : STATUS_IO,
-                             "%.300s cannot be written: %s", path, strerror(errno));
+// Runs a command, one word a line, and returns what it prints. Clears the command; the answer is
+// cleared by the caller in any case.
+static Status slurm_run(Bytes *command, Bytes *answer, Problem *problem) {
+    const char *words[ARGUMENTS + 1] = {NULL};
+    char *rest = command->at;
+    *answer = (Bytes){.most = OUTPUT_BYTES};
+    for (size_t i = 0; i < ARGUMENTS && (words[i] = strsep(&rest, "\n")) != NULL; i++)
+        ;
+    const Status status = command->is_failed
+                              ? problem_set(problem, STATUS_NO_MEMORY, "no memory for Slurm")
+                              : process_run(words, patience, answer, problem);
+    bytes_clear(command);
+    return status == STATUS_OK && !bytes_reserve(answer, 0) // a text also where nothing was printed
+               ? problem_set(problem, STATUS_NO_MEMORY, "no memory for Slurm")
+               : status;
 }
 
 Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Problem *problem) {
-    char name[160], tasks[8192], time[48], output[4096], start[4096], partition[160], first[24];
-    Bytes answer;
-    Words words = {.count = 0};
-    snprintf(name, sizeof name, "--job-name=%s", array->name);
-    snprintf(tasks, sizeof tasks, "--array=%s", array->tasks);
-    snprintf(time, sizeof time, "--time=%.0f", fmax(least_minutes, ceil(array->seconds / 60)));
-    snprintf(output, sizeof output, "--output=%s/log/%%A_%%a", array->folder);
-    snprintf(start, sizeof start, "%s%s", array->folder, script);
-    snprintf(partition, sizeof partition, "--partition=%s",
-             settings->partition != NULL ? settings->partition : "");
-    snprintf(first, sizeof first, "%llu", (unsigned long long)array->first);
-    char comment[40];
-    snprintf(comment, sizeof comment, "--comment=%s", first);
-    const char *const fixed[] = {"sbatch",
-                                 "--parsable",
-                                 name,
-                                 tasks,
-                                 time,
-                                 output,
-                                 comment,
-                                 "--requeue",
-                                 "--export=NIL",
-                                 "--open-mode=append",
-                                 "--signal=B:TERM@30",
-                                 "--ntasks=1",
-                                 "--chdir=/"};
-    for (size_t i = 0; i < COUNT(fixed); i++)
-        words_add(&words, fixed[i]);
+    Bytes command = {0}, answer;
+    bytes_format(&command,
+                 "sbatch\n--parsable\n--job-name=%s\n--array=%s\n--time=%.0f\n"
+                 "--output=%s/log/%%A_%%a\n--comment=%" PRIu64 "\n--requeue\n--export=NIL\n"
+                 "--open-mode=append\n--signal=B:TERM@30\n--ntasks=1\n--chdir=/\n",
+                 array->name, array->tasks, fmax(least_minutes, ceil(array->seconds / 60)),
+                 array->folder, array->first);
     if (settings->partition != NULL)
-        words_add(&words, partition);
-    for (size_t i = 0; settings->options != NULL && i < settings->options->count; i++)
-        words_add(&words, settings->options->at[i]);
-    const char *const command[] = {start, array->program, "chunk", "--first", first, array->folder};
-    for (size_t i = 0; i < COUNT(command); i++)
-        words_add(&words, command[i]);
-    const Status status = slurm_run(&words, &answer, problem);
+        bytes_format(&command, "--partition=%s\n", settings->partition);
+    for (size_t i = 0; i < settings->options->count; i++)
+        bytes_format(&command, "%s\n", settings->options->at[i]);
+    bytes_format(&command, "%s/start\n%s\nchunk\n--first\n%" PRIu64 "\n%s", array->folder,
+                 array->program, array->first, array->folder);
+    const Status status = slurm_run(&command, &answer, problem);
     bytes_clear(&answer);
     return status;
-}
-
-// The text up to the next `end`, which is taken off `*rest`; NULL: there is none.
-static char *text_take(char **rest, char end) {
-    char *taken = *rest;
-    if (taken == NULL || *taken == '\0')
-        return NULL;
-    char *at = strchr(taken, end);
-    *rest = at != NULL ? at + 1 : NULL;
-    if (at != NULL)
-        *at = '\0';
-    return taken;
 }
 
 static SlurmState state_of(const char *name, const char *reason) {
@@ -117,14 +67,13 @@ static SlurmState state_of(const char *name, const char *reason) {
 }
 
 // "123|4|FAILED|0|256|NonZeroExitCode|": the job, the task, its state, the first chunk, how it
-// ended as wait() tells it, the reason.
+// ended as wait() reports it, the reason.
 static bool task_read(char *line, SlurmTask *task) {
     enum { JOB, TASK, STATE, FIRST, END, REASON, FIELDS };
-    char *fields[FIELDS];
+    char *fields[FIELDS], *end;
     for (size_t i = 0; i < COUNT(fields); i++)
-        if ((fields[i] = text_take(&line, '|')) == NULL)
+        if ((fields[i] = strsep(&line, "|")) == NULL)
             return false;
-    char *end;
     const uint64_t index = strtoull(fields[TASK], &end, 10);
     if (*end != '\0' || end == fields[TASK])
         return false;
@@ -132,33 +81,23 @@ static bool task_read(char *line, SlurmTask *task) {
     task->job = strtoull(fields[JOB], NULL, 10);
     task->chunk = strtoull(fields[FIRST], NULL, 10) + index;
     task->exit_code = (int)(strtoul(fields[END], NULL, 10) >> 8);
-    snprintf(task->id, sizeof task->id, "%llu_%llu", (unsigned long long)task->job,
-             (unsigned long long)index);
+    snprintf(task->id, sizeof task->id, "%" PRIu64 "_%" PRIu64, task->job, index);
     const bool has_reason = task->state != SLURM_ENDED && strcmp(fields[REASON], "None") != 0;
     text_fit(task->reason, sizeof task->reason, has_reason ? fields[REASON] : fields[STATE]);
     return true;
 }
 
 Status slurm_tasks(const char *name, SlurmTasks *tasks, Problem *problem) {
-    char wanted[160];
-    Bytes answer;
-    Words words = {.count = 0};
-    snprintf(wanted, sizeof wanted, "--name=%s", name);
-    const char *const all[] = {"squeue",
-                               "--me",
-                               "--noheader",
-                               "--array",
-                               "--states=all",
-                               wanted,
-                               "--Format=ArrayJobID:|,ArrayTaskID:|,State:|,Comment:|,"
-                               "exit_code:|,Reason:|"};
-    for (size_t i = 0; i < COUNT(all); i++)
-        words_add(&words, all[i]);
+    Bytes command = {0}, answer;
     *tasks = (SlurmTasks){NULL, 0};
-    Status status = slurm_run(&words, &answer, problem);
+    bytes_format(&command,
+                 "squeue\n--me\n--noheader\n--array\n--states=all\n--name=%s\n"
+                 "--Format=ArrayJobID:|,ArrayTaskID:|,State:|,Comment:|,exit_code:|,Reason:|",
+                 name);
+    Status status = slurm_run(&command, &answer, problem);
     char *rest = status == STATUS_OK ? answer.at : NULL;
-    for (char *line; status == STATUS_OK && (line = text_take(&rest, '\n')) != NULL;) {
-        SlurmTask task;
+    for (char *line; status == STATUS_OK && (line = strsep(&rest, "\n")) != NULL;) {
+        SlurmTask task = {.job = 0};
         if (!task_read(line, &task))
             continue;
         SlurmTask *added = list_grow(tasks, sizeof *added);
@@ -172,11 +111,9 @@ Status slurm_tasks(const char *name, SlurmTasks *tasks, Problem *problem) {
 }
 
 Status slurm_cancel(const char *name, bool is_task, Problem *problem) {
-    char wanted[160];
-    Bytes answer;
-    snprintf(wanted, sizeof wanted, "%s%s", is_task ? "" : "--name=", name);
-    const Words words = {{"scancel", wanted}, 2};
-    const Status status = slurm_run(&words, &answer, problem);
+    Bytes command = {0}, answer;
+    bytes_format(&command, "scancel\n%s%s", is_task ? "" : "--name=", name);
+    const Status status = slurm_run(&command, &answer, problem);
     bytes_clear(&answer);
     return status;
 }
@@ -184,21 +121,17 @@ Status slurm_cancel(const char *name, bool is_task, Problem *problem) {
 // Slots of "idle|2/4/0/6|Not responding" lines, one of each state, and the reason where no node
 // takes jobs.
 static void facts_read_nodes(char *text, SlurmFacts *facts) {
-    bool is_up = false;
-    for (char *line; (line = text_take(&text, '\n')) != NULL;) {
-        const char *state = text_take(&line, '|'), *processors = text_take(&line, '|'),
-                   *reason = line;
-        if (reason == NULL || strchr(processors, '/') == NULL)
-            continue;
+    for (char *line; (line = strsep(&text, "\n")) != NULL;) {
+        const char *state = strsep(&line, "|"), *processors = strsep(&line, "|");
         char *end;
+        if (line == NULL || strchr(processors, '/') == NULL)
+            continue;
         const size_t busy = strtoul(processors, &end, 10), idle = strtoul(end + 1, NULL, 10);
         facts->slots += busy + idle;
-        if (busy + idle > 0)
-            is_up = true;
-        else if (facts->reason[0] == '\0')
-            snprintf(facts->reason, sizeof facts->reason, "%.40s: %.100s", state, reason);
+        if (busy + idle == 0 && facts->reason[0] == '\0')
+            snprintf(facts->reason, sizeof facts->reason, "%.40s: %.100s", state, line);
     }
-    if (is_up)
+    if (facts->slots > 0)
         facts->reason[0] = '\0';
     else if (facts->reason[0] == '\0')
         text_fit(facts->reason, sizeof facts->reason,
@@ -206,22 +139,19 @@ static void facts_read_nodes(char *text, SlurmFacts *facts) {
 }
 
 Status slurm_facts(const SlurmSettings *settings, SlurmFacts *facts, Problem *problem) {
-    static const char setting[] = "MaxArraySize";
-    char partition[160];
-    Bytes answer;
-    Words nodes = {{"sinfo", "--noheader", "--format=%T|%C|%E"}, 3};
-    *facts = (SlurmFacts){.array_max = 1001};
-    snprintf(partition, sizeof partition, "--partition=%s",
-             settings->partition != NULL ? settings->partition : "");
+    Bytes command = {0}, answer;
+    *facts = (SlurmFacts){.array_max = ARRAY_MAX};
+    bytes_text(&command, "sinfo\n--noheader\n--noconvert\n--format=%T|%C|%E");
     if (settings->partition != NULL)
-        words_add(&nodes, partition);
-    Status status = slurm_run(&nodes, &answer, problem);
+        bytes_format(&command, "\n--partition=%s", settings->partition);
+    Status status = slurm_run(&command, &answer, problem);
     if (status == STATUS_OK)
         facts_read_nodes(answer.at, facts);
     bytes_clear(&answer);
     TRY(status);
-    status = slurm_run(&(Words){{"scontrol", "show", "config"}, 3}, &answer, problem);
-    const char *line = status == STATUS_OK ? strstr(answer.at, setting) : NULL;
+    bytes_text(&command, "scontrol\nshow\nconfig");
+    status = slurm_run(&command, &answer, problem);
+    const char *line = status == STATUS_OK ? strstr(answer.at, "MaxArraySize") : NULL;
     const char *value = line != NULL ? strchr(line, '=') : NULL;
     if (value != NULL && strtoul(value + 1, NULL, 10) > 1)
         facts->array_max = strtoul(value + 1, NULL, 10);

@@ -12,15 +12,16 @@ typedef struct SlurmSettings {
     const Texts *options;  // for sbatch, as "--account=lab"
 } SlurmSettings;
 
-// Writes the script that sbatch is given, FOLDER/start.
-Status slurm_make_start(const char *folder, Problem *problem);
+// What the file `start` in the folder of a study has: sbatch takes scripts alone, this one becomes
+// the program.
+extern const char slurm_start[];
 
 // Tasks of one array job: task i of them makes chunk first + i.
 typedef struct SlurmArray {
     const char *name;    // of the job
     const char *folder;  // of the study
     const char *program; // impactd's path on the nodes
-    const char *tasks;   // "0-99,105"
+    const char *tasks;   // "0-99,105-105"
     uint64_t first;
     double seconds; // asked for each task
 } SlurmArray;
@@ -35,7 +36,7 @@ typedef enum SlurmState {
 } SlurmState;
 typedef struct SlurmTask {
     uint64_t job, chunk;
-    char id[40]; // "123_4"; the worker's words are in FOLDER/log/ID
+    char id[44]; // "123_4"; what the worker printed is in FOLDER/log/ID
     SlurmState state;
     int exit_code;   // of one that ended
     char reason[80]; // why it waits, or how it ended: "OUT_OF_MEMORY"

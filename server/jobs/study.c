@@ -27,8 +27,9 @@ enum {
     LOOK_MS = 1,       // how often a turn looks whether other work waits
     CHUNKS_MAX = 4096, // unless one would have more rows than
     CHUNK_ROWS = 1 << 16,
-    CHUNKS_PER_SLOT = 4, // at least
-    REASONS = 1000,      // kept of the failed rows of a chunk
+    CHUNK_BYTES = 64 << 20, // of a file
+    CHUNKS_PER_SLOT = 4,    // at least
+    REASONS = 1000,         // kept of the failed rows of a chunk
     REASON_BYTES = 160,
 };
 // Short chunks let rows appear soon, and little is lost when the daemon is killed. On a cluster
@@ -206,9 +207,12 @@ size_t study_count_chunks(const StudyRun *run, size_t members, size_t slots) {
     const double each = run->is_clustered ? cluster_chunk_seconds : chunk_seconds;
     double chunks = fmin(ceil(run->task->queued.seconds / each), CHUNKS_MAX);
     chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
+    if (run->is_clustered && !run->is_sweep)
+        chunks = fmax(chunks, ceil(all * (double)run->work->part_bytes / CHUNK_BYTES));
     chunks = fmax(chunks, (double)(CHUNKS_PER_SLOT * slots));
     chunks = ceil(chunks / (double)slots) * (double)slots; // all slots are busy to the end
-    return (size_t)fmin(chunks, all);
+    chunks = fmin(chunks, all);
+    return (size_t)(run->is_sweep ? chunks : ceil(all / ceil(all / chunks))); // that have members
 }
 
 // What is to be done is durable before anything runs; what was written down before stays.
@@ -329,13 +333,13 @@ static void sweep_chunk_add_reason(SweepChunk *chunk, const char *why) {
     bytes_format(&chunk->reasons, "%zu %s\n", chunk->done, line);
 }
 
-// The row of a member that is made.
-static void sweep_chunk_put_row(StudyRun *run, SweepChunk *chunk, const StudyPart *part) {
+void sweep_chunk_put(const StudyRun *run, SweepChunk *chunk, const StudyPart *part) {
     double values[SWEEP_METRICS];
     sweep_values(&((const SweepStudy *)run->work->study)->metrics, &part->run, values);
     sweep_row_put(&run->sweep, &chunk->row, chunk->done, sweep_status(part->run.status), values);
     if (part->run.why != NULL)
         sweep_chunk_add_reason(chunk, part->run.why);
+    chunk->done++;
 }
 
 Status sweep_chunk_restart(StudyRun *run, SweepChunk *chunk, Problem *problem) {
@@ -348,22 +352,19 @@ Status sweep_chunk_restart(StudyRun *run, SweepChunk *chunk, Problem *problem) {
     return STATUS_OK;
 }
 
-void sweep_chunk_put(StudyRun *run, SweepChunk *chunk, const StudyPart *part) {
-    sweep_chunk_put_row(run, chunk, part);
-    chunk->done++;
-}
-
 static Status sweep_chunk_make(StudyRun *run, SweepChunk *chunk, Workspace *workspace,
                                Problem *problem) {
     double values[SWEEP_METRICS];
     StudyPart *part = NULL;
     if (chunk->is_retry &&
-        sweep_row_get(&run->sweep, &chunk->row, chunk->done, values) == SWEEP_MADE)
+        sweep_row_get(&run->sweep, &chunk->row, chunk->done, values) == SWEEP_MADE) {
+        chunk->done++;
         return STATUS_OK;
+    }
     const size_t point = (size_t)(chunk->row.chunk + chunk->done * run->sweep.chunks);
     const Status status = study_engine_part(&run->engine, point, workspace, &part, problem);
     if (status == STATUS_OK) {
-        sweep_chunk_put_row(run, chunk, part);
+        sweep_chunk_put(run, chunk, part);
         run->rows_failed += part->run.why != NULL;
         run->rows_made++;
     }
@@ -447,17 +448,18 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
         .limits = &settings->limits, .progress = &begin, .workspace = &worker->workspace};
     const StudyExecutor *executor = manager->executor;
     run->is_sweep = study_kind(inquiry->study) == &study_sweep;
-    run->is_clustered =
-        executor != NULL &&
-        executor->wants(manager->cluster, study_kind(inquiry->study), run->task->queued.seconds);
-    const size_t slots = run->is_clustered ? executor->slots(manager->cluster) : settings->workers;
+    size_t slots = executor == NULL ? 0
+                                    : executor->slots(manager->cluster, study_kind(inquiry->study),
+                                                      run->task->queued.seconds);
+    run->is_clustered = slots > 0;
+    slots = run->is_clustered ? slots : settings->workers;
     TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &answer->study, &run->work,
                     problem));
     TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
                           run->is_sweep ? 0 : settings->workers, problem));
     if (run->is_sweep)
         TRY(sweep_open(run, slots, problem));
-    return run->is_clustered ? executor->prepare(manager->cluster, run, problem) : STATUS_OK;
+    return run->is_clustered ? executor->prepare(manager->cluster, run, slots, problem) : STATUS_OK;
 }
 
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
@@ -562,7 +564,7 @@ static Status study_make_rows(Worker *worker, const StudyTurn *turn, TurnClock *
     StudyRun *run = turn->run;
     SweepChunk *chunk = turn->chunk;
     TRY(sweep_chunk_load(run, chunk, problem));
-    for (; chunk->done < chunk->count; chunk->done++, clock->made++) {
+    for (; chunk->done < chunk->count; clock->made++) {
         if (clock->made > 0 && study_must_yield(run, clock))
             return STATUS_OK;
         if (!study_engine_continues(&run->engine))

@@ -73,6 +73,7 @@ typedef struct StudyRun {
     double member_seconds; // that a member takes, about
     bool is_pause_logged;
     bool is_failed; // run_result says how
+    ClusterView view;
 } StudyRun;
 
 // What a worker does for a study in one turn: it begins with a member or a chunk of rows, or ends
@@ -98,7 +99,7 @@ void study_run_fail(StudyRun *run, Status status, Problem *problem);
 
 // A chunk whose rows are made elsewhere: restart, put each of them, save.
 Status sweep_chunk_restart(StudyRun *run, SweepChunk *chunk, Problem *problem);
-void sweep_chunk_put(StudyRun *run, SweepChunk *chunk, const StudyPart *part);
+void sweep_chunk_put(const StudyRun *run, SweepChunk *chunk, const StudyPart *part);
 Status sweep_chunk_save(StudyRun *run, SweepChunk *chunk, Problem *problem);
 void sweep_chunk_free(SweepChunk *chunk); // NULL is fine
 

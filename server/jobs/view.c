@@ -14,8 +14,8 @@ static void job_view_progress(const Job *job, JobView *view) {
         view->points_done = atomic_load(&task->study->rows_made);
         view->points_failed = atomic_load(&task->study->rows_failed);
     }
-    if (task != NULL && task->study != NULL && task->study->cluster != NULL)
-        task->manager->executor->view(task->study->cluster, &view->cluster);
+    if (task != NULL && task->study != NULL)
+        view->cluster = task->study->view;
     if (!job_state_is_final(job->row.state) && job->submitted_ns > 0) {
         const int64_t now = clock_monotonic_ns();
         view->row.total = 1e-9 * (double)(now - job->submitted_ns);

@@ -1,10 +1,11 @@
 // This process: its memory and figures, its log, and systemd's protocol for a service of
-// Type=notify, which does nothing without systemd (no NOTIFY_SOCKET).
+// Type=notify, which does nothing without systemd (no NOTIFY_SOCKET); other programs that it runs.
 #ifndef SERVER_UTIL_PROCESS_H
 #define SERVER_UTIL_PROCESS_H
 
 #include <stdint.h>
 
+#include "core/base/status.h"
 #include "server/util/bytes.h"
 
 typedef struct ProcessFacts {
@@ -32,5 +33,11 @@ void log_put(Bytes *bytes, const char *name, const char *text, size_t max);
 // "impactd: " and the line, in one write. Never waits: a line that finds no room is dropped and
 // counted.
 void log_write(const Bytes *line);
+
+// Runs a program of the PATH, without a shell, with these arguments (NULL-terminated, the first is
+// its name) and waits for its end. What it prints is added to `output`, with its messages.
+// STATUS_NOT_FOUND: there is no such program; STATUS_TIMEOUT: it was killed after `seconds`, with
+// all that it started; STATUS_IO: it failed, and the problem has the first line that it printed.
+Status process_run(const char *const *arguments, double seconds, Bytes *output, Problem *problem);
 
 #endif

@@ -4,11 +4,15 @@ After each nothing is lost, twice or wrong: the answer is to the byte that of th
 
 import contextlib
 import os
+import shutil
 import signal
+import subprocess
 import sys
+import tempfile
 import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import program  # noqa: E402
 from disk import fill, small_disk  # noqa: E402
 from site_of_slurm import ensemble, main, site, slow_sweep, sweep, wanted  # noqa: E402
 from slurm import until  # noqa: E402
@@ -143,7 +147,7 @@ def test_a_full_disk_that_later_has_room():
         at.until(all_are_sent)
         ballast = fill(shared)
         at.slurm.open_gate()
-        at.until_reason("full")
+        at.until_reason("full", "No space")
         time.sleep(8)
         assert at.document()["status"] == "running"
         os.remove(ballast)
@@ -311,7 +315,7 @@ def crash(at):
 def test_tasks_that_are_told_to_end():
     """SIGTERM, as before a time limit: the task ends with 75 and is made again; nothing is failed."""
     with site() as at:
-        at.begin(slow_sweep())
+        at.begin(slow_sweep(48))
         told = 0
         while told < 2 and at.document()["status"] in ("accepted", "running"):
             for job, task, _, _ in at.slurm.tasks("--states=running")[:1]:
@@ -340,6 +344,102 @@ def test_tasks_that_are_held():
         at.slurm.call("scontrol", "requeuehold", f"{job}_{task}")
         at.slurm.open_gate()
         at.ends_well()
+
+
+def test_a_study_that_is_cancelled_and_wanted_again():
+    """Wanted again while its tasks are still being cancelled: they are adopted, and not cancelled any more."""
+    with site() as at:
+        at.slurm.close_gate()
+        at.begin(sweep())
+        at.until(all_are_sent)
+        at.slurm.wrap("scancel", "sys.exit('scancel: error: out of order')")
+        at.daemon.request("DELETE", f"/v1/jobs/{at.job}")
+        until(lambda: at.name().endswith(".gone"), "the study is not tidied up")
+        at.begin(sweep())
+        at.until(all_are_sent)
+        os.remove(os.path.join(at.slurm.bin, "scancel"))
+        until(lambda: not any(name.endswith(".gone") for name in os.listdir(at.shared)), "the old folder stays")
+        at.slurm.open_gate()
+        at.ends_well()
+        assert len(at.slurm.calls("sbatch")) == 1, (at.slurm.calls("sbatch"), at.daemon.stderr())
+
+
+def test_a_folder_that_is_deleted():
+    """rm -r of a study's folder, or of a part of it, while tasks run and wait: it is made again, and so is what was lost."""
+    for scene, part in ((sweep(), ""), (ensemble(), ""), (sweep(), "chunks"), (sweep(), "study"), (sweep(), "start")):
+        with site() as at:
+            at.slurm.close_gate()
+            at.begin(scene)
+            at.until(all_are_sent)
+            path = os.path.join(at.shared, at.name(), part)
+            shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
+            at.slurm.open_gate()
+            at.ends_well()
+
+
+def test_a_folder_that_is_a_link():
+    """A study's folder that was moved and linked: it is used, and what is deleted in the end is the link alone."""
+    with site() as at, tempfile.TemporaryDirectory() as other:
+        at.slurm.close_gate()
+        at.begin(sweep())
+        at.until(all_are_sent)
+        path, moved = os.path.join(at.shared, at.name()), os.path.join(other, "moved")
+        shutil.move(path, moved)
+        os.symlink(moved, path)
+        at.slurm.open_gate()
+        at.ends_well()
+        assert os.path.exists(os.path.join(moved, "study"))
+
+
+def test_commands_that_misbehave():
+    """sbatch that prints 80 MB before it refuses, and one that closes its output and hangs: neither stops the daemon."""
+    for code, said in (("sys.stderr.write('too much\\n' * 9000000)\n    sys.exit(1)", "sbatch"),
+                       ("os.closerange(0, 3)\n    time.sleep(100)", "did not answer")):
+        with site() as at:
+            at.slurm.wrap("sbatch", f"if is_first():\n    {code}")
+            at.begin(sweep())
+            at.until_reason(said)
+            at.ends_well()
+
+
+def test_a_restart_without_the_cluster():
+    """Threads finish what the cluster began; what it left is tidied up when there is a cluster again."""
+    for scene in (sweep(), ensemble()):
+        with site() as at:
+            at.slurm.close_gate()
+            at.begin(scene)
+            at.until(all_are_sent)
+            at.kill()
+            options, at.options = at.options, []
+            at.start()
+            assert at.finished() == wanted(scene)
+            at.daemon.stop(60)
+            at.options = options
+            at.start()
+            at.is_clean()
+
+
+def test_the_check_of_the_set_up():
+    """impactd check --executor slurm: what works, and for each fault a sentence; nothing is left in the folder."""
+    with site() as at:
+        def check(*options, shared=at.shared):
+            done = subprocess.run([program.impactd(), "check", "--executor", "slurm", "--shared", shared, *options], capture_output=True,
+                                  text=True, check=False, timeout=150, env={**os.environ, **at.slurm.environment})
+            assert os.listdir(at.shared) == [], os.listdir(at.shared)
+            return done.returncode, done.stdout + done.stderr
+        code, text = check()
+        assert code == 0 and "was made by a node" in text, text
+        for options, said in ((["--partition", "nowhere"], "no such partition"), (["--sbatch-option=--no-such-option"], "no-such-option")):
+            code, text = check(*options)
+            assert code != 0 and said in text, (code, text)
+        assert "absolute" in check(shared="relative")[1]
+        assert "No such file" in check(shared="/nowhere")[1]
+        os.chmod(at.shared, 0o770)
+        assert "chmod 700" in check()[1]
+        os.chmod(at.shared, 0o700)
+        at.slurm.wrap("sbatch", "arguments[-5] = '/nowhere/impactd'")
+        code, text = check()
+        assert code != 0 and "a node did not make a study" in text and "nowhere" in text, text
 
 
 if __name__ == "__main__":

@@ -88,14 +88,14 @@ class Site:
     """One study at a time: begin it, disturb it, ends_well."""
 
     def __init__(self, slurm, shared, poll):
-        self.slurm, self.shared, self.poll = slurm, shared, poll
+        self.slurm, self.shared = slurm, shared
         os.chmod(shared, 0o700)
         self.data = tempfile.mkdtemp(prefix="impactd-")
-        self.further = []
+        self.options, self.further = slurm.options(shared, poll), []
         self.scene = self.job = self.daemon = None
 
     def start(self):
-        self.daemon = Daemon(program.build, *self.slurm.options(self.shared, self.poll), *self.further, data=self.data,
+        self.daemon = Daemon(program.build, *self.options, *self.further, data=self.data,
                              environment=self.slurm.environment).start()
         upload(self.daemon)
         return self.daemon

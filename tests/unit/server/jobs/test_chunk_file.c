@@ -49,12 +49,10 @@ static void shared_open(Shared *shared, uint64_t chunks) {
                                   &warnings, &problem),
                      STATUS_OK);
     assert_int_equal(
-        chunk_plan_make(&shared->plan, &shared->request, "r-1", &shared->limits, &problem),
-        STATUS_OK);
+        chunk_plan_make(&shared->plan, &shared->request, db, &shared->limits, &problem), STATUS_OK);
     shared->plan.members = 7;
     shared->plan.chunks = chunks;
-    assert_int_equal(chunk_folder_make(shared->folder, &shared->plan, &shared->request, db,
-                                       &shared->key, &problem),
+    assert_int_equal(chunk_folder_make(shared->folder, &shared->plan, &shared->key, &problem),
                      STATUS_OK);
     const StudyTools tools = {.limits = &shared->limits};
     assert_int_equal(study_begin(shared->request.study, &shared->request.simulation, &tools,
@@ -209,16 +207,12 @@ TEST(a_study_that_is_there_keeps_its_chunks_and_another_engine_is_refused) {
     StudyRequest request;
     shared_open(&shared, 2);
     shared.plan.chunks = 5;
-    assert_int_equal(
-        chunk_folder_make(shared.folder, &shared.plan, &shared.request, NULL, &key, &problem),
-        STATUS_OK);
+    assert_int_equal(chunk_folder_make(shared.folder, &shared.plan, &key, &problem), STATUS_OK);
     assert_int_equal(shared.plan.chunks, 2);
     assert_memory_equal(&key, &shared.key, sizeof key);
     free(shared.plan.engine);
     shared.plan.engine = strdup("impactd-0");
-    assert_int_equal(
-        chunk_folder_make(shared.folder, &shared.plan, &shared.request, NULL, &key, &problem),
-        STATUS_OK);
+    assert_int_equal(chunk_folder_make(shared.folder, &shared.plan, &key, &problem), STATUS_OK);
     assert_int_equal(chunk_folder_read(shared.folder, &plan, &key, &request, &problem),
                      STATUS_INVALID);
     assert_non_null(strstr(problem.detail, "impactd-0"));
