@@ -15,7 +15,7 @@ CHUNKS_MAX, CHUNK_ROWS, CHUNKS_PER_SLOT, CHUNK_SECONDS = 4096, 1 << 16, 4, 120
 RATES = {"Slurm as it comes": (2.9, 2.97), "told to schedule at once": (13.4, 0.97)}
 # [s]: a task's own start, a row's way into the database, the daemon's look at the folder.
 START, ROW, SCAN = 0.15, 1.5e-6, 2.0
-# Points that the daemon validates before the first task, and how long one takes [s].
+# Up to so many points the daemon validates before the first task; how long one takes [s].
 VALIDATED, VALIDATION = 10**6, 1e-5
 DEVIATION = 0.03  # of the time of a chunk
 
@@ -32,7 +32,7 @@ def simulate(scenes, slots, scene, rate, delay, seed=1):
     chance = random.Random(seed)
     chunks = count_chunks(scenes, slots, scenes * scene)
     costs = [scenes / chunks * scene * chance.gauss(1, DEVIATION) for _ in range(chunks)]
-    begun = min(scenes, VALIDATED) * VALIDATION
+    begun = scenes * VALIDATION if scenes <= VALIDATED else 0.0
     free = [begun] * slots  # when each slot is
     started = taken = begun  # the last start, the end of the last file's way into the database
     for cost in costs:
