@@ -38,8 +38,9 @@ SCENE = {"structure": {"kind": "sdof", "mass": 1.35, "stiffness": 865},
          "output": {"channels": ["displacement"], "psd": {"channels": ["displacement"], "segment": 64}},
          "study": {"kind": "ensemble", "runs": 7, "inputs": [
              {"pointer": "/dampers/0/mass", "distribution": "uniform", "from": 0.09, "to": 0.11}]}}
-STUDY = {"result": "r-" + 64 * "0", "members": 7, "chunks": 3, "is_strided": True, "samples": 1 << 20, "impacts": 5000, "points": 1000,
-         "steps": 1e9, "bytes": 1e9, "document_bytes": 1e9, "scene": program.json.dumps(SCENE)}
+LIMITS = {"samples": 1 << 20, "impacts": 5000, "points": 1000, "steps": 1e9, "bytes": 1e9, "document_bytes": 1e9}
+STUDY = {"members": 7, "chunks": 3, "is_strided": True, "scene": program.json.dumps(SCENE),
+         **{f"limits.{name}": limit for name, limit in LIMITS.items()}}
 MOTION = "PEER\nrecord\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 4, DT= .0200 SEC\n0.1 -0.2 0.3 -0.1\n"
 
 
@@ -61,8 +62,7 @@ def prepare(folder):
             assert daemon.submit(long, headers={"Prefer": "respond-async"}).status == 202
     finally:
         daemon.kill()
-    for name in ("records", "chunks"):
-        os.makedirs(os.path.join(folder, "study", name))
+    os.makedirs(os.path.join(folder, "study", "chunks"))
     for name, text in (("motion.AT2", MOTION), ("scene.json", program.json.dumps(scene)),
                        ("study/study", program.json.dumps({"engine": engine, **STUDY}))):
         with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
