@@ -208,7 +208,7 @@ static Status plan_read(const char *folder, ChunkPlan *plan, ChunkKey *key, Prob
 static bool plan_is_of(const ChunkPlan *plan, const ChunkPlan *other) {
     return strcmp(plan->engine, other->engine) == 0 && strcmp(plan->scene, other->scene) == 0 &&
            plan->members == other->members && plan->is_strided == other->is_strided &&
-           (!plan->is_strided || plan->chunks == other->chunks) &&
+           (!plan->is_made || plan->chunks == other->chunks) &&
            memcmp(&plan->limits, &other->limits, sizeof plan->limits) == 0;
 }
 
@@ -227,6 +227,7 @@ Status chunk_folder_make(const char *folder, ChunkPlan *plan, ChunkKey *key, Pro
     if (is_there)
         plan->chunks = stored.chunks;
     chunk_plan_clear(&stored);
+    plan->is_made = true;
     if (is_there)
         return STATUS_OK;
     encode_item(&text, plan_fields, plan, WRITE_SCENE);

@@ -29,6 +29,7 @@ typedef struct ChunkPlan {
     char *scene;  // canonical JSON, with the study
     uint64_t members, chunks;
     bool is_strided; // chunk i has the members i, i + chunks ..., else those that follow each other
+    bool is_made;    // its folder was made, or will be with this number of chunks
     SimulationLimits limits; // of each run
     struct {
         ChunkRecord *at;
@@ -56,7 +57,7 @@ enum {
 };
 
 // Makes the folder with the study, where it is not there yet. A study that is there keeps its
-// number of chunks, which the plan takes. STATUS_FULL, STATUS_IO.
+// number of chunks, which the plan takes the first time (is_made). STATUS_FULL, STATUS_IO.
 Status chunk_folder_make(const char *folder, ChunkPlan *plan, ChunkKey *key, Problem *problem);
 // Reads it back: the request is complete, with its records. Both are cleared by the caller in any
 // case. STATUS_INVALID: the folder has no study of this engine.

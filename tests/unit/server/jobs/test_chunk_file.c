@@ -207,9 +207,15 @@ TEST(a_study_that_is_there_keeps_its_chunks_and_another_engine_is_refused) {
     StudyRequest request;
     shared_open(&shared, 2);
     shared.plan.chunks = 5;
+    shared.plan.is_made = false; // as after a restart
     assert_int_equal(chunk_folder_make(shared.folder, &shared.plan, &key, &problem), STATUS_OK);
     assert_int_equal(shared.plan.chunks, 2);
     assert_memory_equal(&key, &shared.key, sizeof key);
+    // Memory was allocated for them, so that another number is not taken any more.
+    shared.plan.chunks = 5;
+    assert_int_equal(chunk_folder_make(shared.folder, &shared.plan, &key, &problem), STATUS_OK);
+    assert_int_equal(shared.plan.chunks, 5);
+    assert_memory_not_equal(&key, &shared.key, sizeof key);
     free(shared.plan.engine);
     shared.plan.engine = strdup("impactd-0");
     assert_int_equal(chunk_folder_make(shared.folder, &shared.plan, &key, &problem), STATUS_OK);
