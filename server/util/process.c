@@ -191,7 +191,8 @@ static Status process_result(const char *name, int state, const Bytes *output, P
     const char *text = output->at != NULL ? output->at : "";
     const size_t length = strcspn(text, "\n");
     if (output->is_failed)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for all that %s prints", name);
+        return problem_set(problem, output->is_over ? STATUS_IO : STATUS_NO_MEMORY,
+                           "%s prints more than %zu bytes, or than memory has", name, output->most);
     if (WIFEXITED(state) && WEXITSTATUS(state) == 0)
         return STATUS_OK;
     return length > 0
@@ -201,7 +202,7 @@ static Status process_result(const char *name, int state, const Bytes *output, P
 
 Status process_run(const char *const *arguments, double seconds, Bytes *output, Problem *problem) {
     const int64_t end_ns = clock_monotonic_ns() + (int64_t)(1e9 * seconds);
-    int ends[2], state = 0;
+    int ends[2], state = 1 << 8; // where its end is not seen, as if it had failed
     pid_t child;
     bool is_late = false;
     if (pipe2(ends, O_CLOEXEC) != 0)
