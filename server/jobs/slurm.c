@@ -35,17 +35,18 @@ static Status slurm_run(Bytes *command, Bytes *answer, Problem *problem) {
 
 Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Problem *problem) {
     Bytes command = {0}, answer;
-    bytes_format(&command,
-                 "sbatch\n--parsable\n--job-name=%s\n--array=%s\n--time=%.0f\n"
-                 "--output=%s/log/%%A_%%a\n--comment=%" PRIu64 "\n--requeue\n--export=NIL\n"
-                 "--open-mode=append\n--signal=B:TERM@30\n--ntasks=1\n--chdir=/\n",
-                 array->name, array->tasks, fmax(least_minutes, ceil(array->seconds / 60)),
-                 array->folder, array->first);
+    bytes_format(&command, "sbatch\n--time=%.0f\n--requeue\n--export=NIL\n--signal=B:TERM@30\n",
+                 fmax(least_minutes, ceil(array->seconds / 60)));
     if (settings->partition != NULL)
         bytes_format(&command, "--partition=%s\n", settings->partition);
     for (size_t i = 0; i < settings->options->count; i++)
         bytes_format(&command, "%s\n", settings->options->at[i]);
-    bytes_format(&command, "%s/start\n%s\nchunk\n--first\n%" PRIu64 "\n%s", array->folder,
+    // By these the tasks are found and make the right chunks: no option may change them.
+    bytes_format(&command,
+                 "--parsable\n--job-name=%s\n--array=%s\n--comment=%" PRIu64 "\n--ntasks=1\n"
+                 "--output=%s/log/%%A_%%a\n--open-mode=append\n--chdir=/\n"
+                 "%s/start\n%s\nchunk\n--first\n%" PRIu64 "\n%s",
+                 array->name, array->tasks, array->first, array->folder, array->folder,
                  array->program, array->first, array->folder);
     const Status status = slurm_run(&command, &answer, problem);
     bytes_clear(&answer);
