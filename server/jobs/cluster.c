@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -66,6 +67,7 @@ struct Cluster {
     const ClusterSettings *settings;
     SlurmSettings slurm;
     char program[PATH_MAX], id[9];
+    ino_t shared;         // number of the folder
     pthread_mutex_t lock; // no study's folder is made and renamed at once; of the facts
     pthread_t thread;
     bool is_started;
@@ -129,9 +131,17 @@ static void cluster_study_free(ClusterStudy *study) {
     free(study);
 }
 
-// Writes what is to be made, as far as it is not in the folder.
+// Writes what is to be made, as far as it is not in the folder. Where the file system of the shared
+// folder is not mounted, no node would see what is written, and no file of theirs be seen here.
 static Status study_write(ClusterStudy *study, Problem *problem) {
+    const char *shared = study->cluster->settings->shared;
     Bytes start = {0};
+    struct stat facts;
+    if (stat(shared, &facts) != 0 || facts.st_ino != study->cluster->shared)
+        return problem_set(problem, STATUS_IO,
+                           "%.160s is not the folder that it was when the server started: mount "
+                           "it, or start the server again",
+                           shared);
     bytes_text(&start, slurm_start);
     pthread_mutex_lock(&study->cluster->lock);
     Status status = chunk_folder_make(study->folder, &study->plan, &study->key, problem);
@@ -149,7 +159,7 @@ static Status study_plan(ClusterStudy *study, size_t slots, Problem *problem) {
     TRY(chunk_plan_make(plan, &run->task->inquiry, run->manager->db, &run->manager->settings.limits,
                         problem));
     plan->members = run->work->members;
-    plan->is_strided = run->is_sweep;
+    plan->is_strided = plan->is_made = run->is_sweep;
     plan->chunks =
         run->is_sweep ? run->sweep.chunks : study_count_chunks(run, run->work->members, slots);
     return study_write(study, problem);
@@ -724,6 +734,7 @@ static const StudyExecutor cluster_executor = {.slots = cluster_slots,
 Status cluster_open(JobManager *manager, Problem *problem) {
     const ClusterSettings *settings = &manager->settings.cluster;
     Cluster *cluster = manager->cluster = calloc(1, sizeof *cluster);
+    struct stat facts;
     manager->executor = &cluster_executor;
     if (cluster == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the cluster's studies");
@@ -733,9 +744,11 @@ Status cluster_open(JobManager *manager, Problem *problem) {
     cluster->facts.array_max = 1001; // until Slurm answers
     cluster_set_id(cluster);
     pthread_mutex_init(&cluster->lock, NULL);
-    if (realpath("/proc/self/exe", cluster->program) == NULL)
-        return problem_set(problem, STATUS_IO, "the path of this program is not known: %s",
+    (void)signal(SIGCHLD, SIG_DFL); // ignored, Slurm's commands would have no exit code
+    if (realpath("/proc/self/exe", cluster->program) == NULL || stat(settings->shared, &facts) != 0)
+        return problem_set(problem, STATUS_IO, "/proc/self/exe, or %.300s: %s", settings->shared,
                            strerror(errno));
+    cluster->shared = facts.st_ino;
     TRY(thread_start(&cluster->thread, cluster_main, cluster, "the cluster's thread", problem));
     cluster->is_started = true;
     return STATUS_OK;

@@ -271,6 +271,36 @@ def test_small_arrays():
         at.ends_well()
 
 
+def test_a_shared_folder_that_is_away():
+    """Not mounted, or another folder in its place: nothing is judged, sent or made there until it is back."""
+    for is_replaced in (True, False):
+        with site() as at:
+            at.slurm.close_gate()
+            at.begin(sweep())
+            at.until(all_are_sent)
+            os.rename(at.shared, at.shared + ".away")
+            if is_replaced:
+                os.mkdir(at.shared, 0o700)
+            at.until_reason("not the folder")
+            at.slurm.call("scancel", "--state=pending", *{job for job, _, _, _ in at.slurm.tasks()})
+            time.sleep(3)
+            assert len(at.slurm.calls("sbatch")) == 1
+            if is_replaced:
+                os.rmdir(at.shared)  # it is empty
+            os.rename(at.shared + ".away", at.shared)
+            at.slurm.open_gate()
+            at.ends_well()
+
+
+def test_options_that_would_hide_the_tasks():
+    """Options of the administrator are for accounts and nodes: the names and numbers by which tasks are found stay."""
+    with site() as at:
+        at.further = [f"--sbatch-option=--{option}" for option in (
+            "comment=lab", "job-name=lab", "array=99", "output=/dev/null", "chdir=/nowhere", "ntasks=2", "nice=5")]
+        at.begin(ensemble())
+        at.ends_well()
+
+
 def test_few_tasks_at_once():
     """Where Slurm takes few tasks at once, others follow as these end; refusals are no failures."""
     with site() as at:
