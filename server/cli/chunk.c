@@ -13,17 +13,6 @@
 #include "server/jobs/chunk_file.h"
 #include "server/jobs/jobs_private.h"
 
-typedef struct ChunkSettings {
-    uint64_t first;
-} ChunkSettings;
-
-// clang-format off
-static const Field chunk_fields[] = {
-    FIELD_COUNT(ChunkSettings, first, NULL, WITHIN(0, 1e6), 0, "chunk of task 0"),
-    FIELD_END,
-};
-// clang-format on
-
 // A chunk on its way.
 typedef struct ChunkMaking {
     const char *folder;
@@ -174,17 +163,17 @@ static int chunk_exit(Status status) {
 }
 
 static int chunk_run(const Command *self, void *item, const Options *options, Problem *problem) {
-    const ChunkSettings *settings = item;
-    ChunkMaking making = {.chunk = (size_t)settings->first};
+    ChunkMaking making = {.count = 0};
     char *end = NULL;
-    const unsigned long task =
-        options->operand_count == 2 ? strtoul(options->operands[1], &end, 10) : 0;
-    if (options->operand_count != 2 || end == options->operands[1] || *end != '\0') {
-        (void)problem_set(problem, STATUS_USAGE, "expects a folder and the number of a task");
+    (void)item;
+    if (options->operand_count == 2) {
+        making.folder = options->operands[0];
+        making.chunk = strtoul(options->operands[1], &end, 10);
+    }
+    if (end == NULL || end == options->operands[1] || *end != '\0') {
+        (void)problem_set(problem, STATUS_USAGE, "expects a folder and the number of a chunk");
         return command_error(self->name, problem);
     }
-    making.folder = options->operands[0];
-    making.chunk += task;
     (void)signal(SIGTERM, chunk_stop);
     (void)signal(SIGPIPE, SIG_IGN);
     const int code = chunk_exit(chunk_make(&making, problem));
@@ -200,13 +189,11 @@ static int chunk_run(const Command *self, void *item, const Options *options, Pr
 
 const Command command_chunk = {
     .name = "chunk",
-    .operands = "FOLDER TASK",
+    .operands = "FOLDER CHUNK",
     .summary = "make one chunk of a study in a folder that a cluster shares",
     .help = "impactd serve --executor slurm submits this; there is no need to call it by hand.\n"
             "\n"
             "The exit code is 65 where the chunk can never be made (another version of impactd),\n"
             "74 where the folder is full, 75 where another attempt may succeed.\n",
-    .options = chunk_fields,
-    .size = sizeof(ChunkSettings),
     .run = chunk_run,
 };

@@ -517,25 +517,6 @@ static bool study_wants_chunk(const ClusterStudy *study, size_t chunk) {
             chunk_plan_member(&study->plan, chunk, 0) < atomic_load(&study->run->engine.expected));
 }
 
-// The chunks from `*at` on that are to be sent with one array, at most `most`, as "0-99,105-105" of
-// its tasks, which are chunks from `first` to before `end`. Returns how many; *at is behind the
-// last.
-static size_t study_choose(const ClusterStudy *study, size_t first, size_t end, size_t *at,
-                           size_t most, Bytes *tasks) {
-    size_t count = 0;
-    while (*at < end && count < most && tasks->count < TASKS_BYTES) {
-        const size_t begin = *at;
-        for (; *at < end && count < most && study_wants_chunk(study, *at); ++*at)
-            count++;
-        if (*at > begin)
-            bytes_format(tasks, "%s%zu-%zu", tasks->count > 0 ? "," : "", begin - first,
-                         *at - 1 - first);
-        else
-            ++*at;
-    }
-    return count;
-}
-
 static Status study_send(ClusterStudy *study, size_t first, Bytes *tasks, Problem *problem) {
     const double seconds = study->run->task->queued.seconds / (double)study->plan.chunks;
     const SlurmArray array = {.name = study->name,
@@ -563,10 +544,14 @@ static Status study_submit(ClusterStudy *study, Problem *problem) {
     for (size_t i = study->first; i < study->plan.chunks; i++)
         live += study->chunks[i].state == CHUNK_SUBMITTED;
     for (size_t at = study->first; at < study->plan.chunks && live < study->window;) {
-        Bytes tasks = {0};
-        const size_t from = at, first = at / each * each, left = study->plan.chunks - first;
-        const size_t end = first + (each < left ? each : left);
-        const size_t count = study_choose(study, first, end, &at, study->window - live, &tasks);
+        Bytes tasks = {0}; // of one array, which begins at chunk `first`
+        const size_t from = at, first = at / each * each;
+        size_t count = 0;
+        for (; at < study->plan.chunks && at < first + each && live + count < study->window &&
+               tasks.count < TASKS_BYTES;
+             at++)
+            if (study_wants_chunk(study, at))
+                bytes_format(&tasks, "%s%zu", count++ > 0 ? "," : "", at - first);
         if (count == 0)
             continue;
         const Status status = study_send(study, first, &tasks, problem);

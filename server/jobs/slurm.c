@@ -14,7 +14,7 @@ enum { OUTPUT_BYTES = 64 << 20, ARGUMENTS = 64, ARRAY_MAX = 1001 };
 static const double patience = 20;     // [s] for an answer
 static const double least_minutes = 5; // asked for a task: nodes may be busy
 
-const char slurm_start[] = "#!/bin/sh\nexec \"$@\" \"$SLURM_ARRAY_TASK_ID\"\n";
+const char slurm_start[] = "#!/bin/sh\nexec \"$1\" chunk \"$2\" $(($3 + SLURM_ARRAY_TASK_ID))\n";
 
 // Runs a command, one word a line, and returns what it prints. Clears the command; the answer is
 // cleared by the caller in any case.
@@ -45,9 +45,9 @@ Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Prob
     bytes_format(&command,
                  "--parsable\n--job-name=%s\n--array=%s\n--comment=%" PRIu64 "\n--ntasks=1\n"
                  "--output=%s/log/%%A_%%a\n--open-mode=append\n--chdir=/\n"
-                 "%s/start\n%s\nchunk\n--first\n%" PRIu64 "\n%s",
+                 "%s/start\n%s\n%s\n%" PRIu64,
                  array->name, array->tasks, array->first, array->folder, array->folder,
-                 array->program, array->first, array->folder);
+                 array->program, array->folder, array->first);
     const Status status = slurm_run(&command, &answer, problem);
     bytes_clear(&answer);
     return status;

@@ -21,7 +21,7 @@ typedef struct SlurmArray {
     const char *name;    // of the job
     const char *folder;  // of the study
     const char *program; // impactd's path on the nodes
-    const char *tasks;   // "0-99,105-105"
+    const char *tasks;   // "0,1,105"
     uint64_t first;
     double seconds; // asked for each task
 } SlurmArray;

@@ -72,11 +72,9 @@ def wanted(scene):
 
 
 def tasks_of(call):
-    """The tasks of a call of sbatch: of --array=0-3,7-7."""
-    (ranges,) = [word[8:] for word in call.split() if word.startswith("--array=")]
-    for one in ranges.split(","):
-        first, last = one.split("-")
-        yield from range(int(first), int(last) + 1)
+    """The tasks of a call of sbatch: of --array=0,1,7."""
+    (tasks,) = [word[8:] for word in call.split() if word.startswith("--array=")]
+    return [int(task) for task in tasks.split(",")]
 
 
 def upload(daemon):

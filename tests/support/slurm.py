@@ -120,7 +120,7 @@ class Slurm:
         self.bin = os.path.join(self.folder, "bin")
         self.environment = {"SLURM_CONF": os.path.join(self.folder, "slurm.conf"), "PATH": f"{self.bin}:{PATH}"}
         self.gate_path = os.path.join(self.bin, "gate.impactd")
-        self.gate = f"arguments[-5] = {self.gate_path!r}"  # for a wrapper of sbatch
+        self.gate = f"arguments[-3] = {self.gate_path!r}"  # for a wrapper of sbatch
         self.daemons = {}
         self.is_spoiled = False
         os.mkdir(self.bin)
