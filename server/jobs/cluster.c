@@ -26,13 +26,13 @@ enum {
     NAME_SIZE = 120,
     RESULT_SIZE = 66, // of a result's id
 };
-static const char prefix[] = "impactd-", gone[] = ".gone"; // of the name of a study, after it
-static const double turn_each = 0.2;                       // [s] between turns of the thread
-static const double scan_each = 0.5;                       // [s] between looks at the folder
-static const double poll_most = 60;                        // [s] between questions to Slurm
-static const double facts_each = 5;                        // [s] between questions about its nodes
-static const double tidy_each = 1;                         // [s]
-static const double audit_share = 0.02;                    // of the time since the study began
+static const char prefix[] = "impactd-"; // of the name of a study
+static const double turn_each = 0.2;     // [s] between turns of the thread
+static const double scan_each = 0.5;     // [s] between looks at the folder
+static const double poll_most = 60;      // [s] between questions to Slurm
+static const double facts_each = 5;      // [s] between questions about its nodes
+static const double tidy_each = 1;       // [s]
+static const double audit_share = 0.02;  // of the time since the study began
 
 typedef enum ChunkState { CHUNK_TO_DO, CHUNK_SUBMITTED, CHUNK_DONE } ChunkState;
 
@@ -68,7 +68,7 @@ struct Cluster {
     SlurmSettings slurm;
     char program[PATH_MAX], id[9];
     ino_t shared;         // number of the folder
-    pthread_mutex_t lock; // no study's folder is made and renamed at once; of the facts
+    pthread_mutex_t lock; // no study's folder is made and deleted at once; of the facts
     pthread_t thread;
     bool is_started;
     Worker worker;         // ends studies
@@ -602,36 +602,28 @@ static void study_step(ClusterStudy *study, Problem *problem) {
         study_poll(study, problem);
 }
 
-// Cancels and deletes what is left of a study that no job wants any more. Its name is taken away
-// first, so that no worker writes there meanwhile. Where the study is wanted again by then, its
-// tasks are too. Returns whether anything is left.
-static bool cluster_tidy_one(Cluster *cluster, const char *entry) {
-    const char *shared = cluster->settings->shared, *end = strstr(entry, gone);
+// Cancels and deletes what is left of a study that no job wants any more. Should it be wanted again
+// meanwhile, it waits for the lock. Returns whether anything is left.
+static bool cluster_tidy_one(Cluster *cluster, const char *name) {
     JobManager *manager = cluster->manager;
-    char path[PATH_MAX], away[PATH_MAX], name[NAME_SIZE], result[RESULT_SIZE + 1];
-    snprintf(name, sizeof name, "%.*s", (int)(end != NULL ? end - entry : NAME_SIZE - 1), entry);
-    snprintf(path, sizeof path, "%.3000s/%s", shared, name);
-    snprintf(away, sizeof away, "%.3000s/%s%s", shared, name, gone);
+    char path[PATH_MAX], result[RESULT_SIZE + 1];
+    SlurmTasks tasks = {NULL, 0};
+    snprintf(path, sizeof path, "%.3000s/%s", cluster->settings->shared, name);
     snprintf(result, sizeof result, "%.66s", name + sizeof prefix - 1);
     pthread_mutex_lock(&cluster->lock);
     pthread_mutex_lock(&manager->lock);
-    const bool is_closing = manager->is_closing;
-    const bool is_wanted = hashmap_find(manager->tasks, result) != NULL;
+    const bool is_wanted = manager->is_closing || hashmap_find(manager->tasks, result) != NULL;
     pthread_mutex_unlock(&manager->lock);
-    const bool is_away = !is_closing && (end != NULL || (!is_wanted && rename(path, away) == 0));
-    pthread_mutex_unlock(&cluster->lock);
-    if (!is_away)
-        return true;
-    SlurmTasks tasks = {NULL, 0};
-    bool is_left = !is_wanted && (slurm_cancel(name, false, NULL) != STATUS_OK ||
-                                  slurm_tasks(name, &tasks, NULL) != STATUS_OK);
+    bool is_left = is_wanted || slurm_cancel(name, false, NULL) != STATUS_OK ||
+                   slurm_tasks(name, &tasks, NULL) != STATUS_OK;
     // One that was about to start may have escaped.
     for (size_t i = 0; i < tasks.count; i++)
         is_left = is_left || tasks.at[i].state != SLURM_ENDED;
     free(tasks.at);
     if (!is_left)
-        chunk_folder_remove(away);
-    return is_left;
+        chunk_folder_remove(path);
+    pthread_mutex_unlock(&cluster->lock);
+    return is_left || access(path, F_OK) == 0;
 }
 
 static void cluster_tidy(Cluster *cluster) {

@@ -16,40 +16,41 @@ static const double least_minutes = 5; // asked for a task: nodes may be busy
 
 const char slurm_start[] = "#!/bin/sh\nexec \"$1\" chunk \"$2\" $(($3 + SLURM_ARRAY_TASK_ID))\n";
 
-// Runs a command, one word a line, and returns what it prints. Clears the command; the answer is
-// cleared by the caller in any case.
-static Status slurm_run(Bytes *command, Bytes *answer, Problem *problem) {
+// Runs the command in `text`, one word a line, and replaces it by what it prints. Cleared by the
+// caller in any case.
+static Status slurm_run(Bytes *text, Problem *problem) {
     const char *words[ARGUMENTS + 1] = {NULL};
-    char *rest = command->at;
-    *answer = (Bytes){.most = OUTPUT_BYTES};
+    Bytes command = *text;
+    char *rest = command.at;
+    *text = (Bytes){.most = OUTPUT_BYTES};
     for (size_t i = 0; i < ARGUMENTS && (words[i] = strsep(&rest, "\n")) != NULL; i++)
         ;
-    const Status status = command->is_failed
-                              ? problem_set(problem, STATUS_NO_MEMORY, "no memory for Slurm")
-                              : process_run(words, patience, answer, problem);
-    bytes_clear(command);
-    return status == STATUS_OK && !bytes_reserve(answer, 0) // a text also where nothing was printed
-               ? problem_set(problem, STATUS_NO_MEMORY, "no memory for Slurm")
-               : status;
+    Status status = STATUS_NO_MEMORY;
+    if (!command.is_failed && bytes_reserve(text, 0)) // a text also where nothing is printed
+        status = process_run(words, patience, text, problem);
+    else
+        (void)problem_set(problem, status, "no memory for Slurm");
+    bytes_clear(&command);
+    return status;
 }
 
 Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Problem *problem) {
-    Bytes command = {0}, answer;
-    bytes_format(&command, "sbatch\n--time=%.0f\n--requeue\n--export=NIL\n--signal=B:TERM@30\n",
+    Bytes text = {0};
+    bytes_format(&text, "sbatch\n--time=%.0f\n--requeue\n--export=NIL\n--signal=B:TERM@30\n",
                  fmax(least_minutes, ceil(array->seconds / 60)));
     if (settings->partition != NULL)
-        bytes_format(&command, "--partition=%s\n", settings->partition);
+        bytes_format(&text, "--partition=%s\n", settings->partition);
     for (size_t i = 0; i < settings->options->count; i++)
-        bytes_format(&command, "%s\n", settings->options->at[i]);
+        bytes_format(&text, "%s\n", settings->options->at[i]);
     // By these the tasks are found and make the right chunks: no option may change them.
-    bytes_format(&command,
+    bytes_format(&text,
                  "--parsable\n--job-name=%s\n--array=%s\n--comment=%" PRIu64 "\n--ntasks=1\n"
                  "--output=%s/log/%%A_%%a\n--open-mode=append\n--chdir=/\n"
                  "%s/start\n%s\n%s\n%" PRIu64,
                  array->name, array->tasks, array->first, array->folder, array->folder,
                  array->program, array->folder, array->first);
-    const Status status = slurm_run(&command, &answer, problem);
-    bytes_clear(&answer);
+    const Status status = slurm_run(&text, problem);
+    bytes_clear(&text);
     return status;
 }
 
@@ -89,14 +90,14 @@ static bool task_read(char *line, SlurmTask *task) {
 }
 
 Status slurm_tasks(const char *name, SlurmTasks *tasks, Problem *problem) {
-    Bytes command = {0}, answer;
+    Bytes text = {0};
     *tasks = (SlurmTasks){NULL, 0};
-    bytes_format(&command,
+    bytes_format(&text,
                  "squeue\n--me\n--noheader\n--array\n--states=all\n--name=%s\n"
                  "--Format=ArrayJobID:|,ArrayTaskID:|,State:|,Comment:|,exit_code:|,Reason:|",
                  name);
-    Status status = slurm_run(&command, &answer, problem);
-    char *rest = status == STATUS_OK ? answer.at : NULL;
+    Status status = slurm_run(&text, problem);
+    char *rest = status == STATUS_OK ? text.at : NULL;
     for (char *line; status == STATUS_OK && (line = strsep(&rest, "\n")) != NULL;) {
         SlurmTask task = {.job = 0};
         if (!task_read(line, &task))
@@ -107,15 +108,15 @@ Status slurm_tasks(const char *name, SlurmTasks *tasks, Problem *problem) {
         else
             *added = task;
     }
-    bytes_clear(&answer);
+    bytes_clear(&text);
     return status;
 }
 
 Status slurm_cancel(const char *name, bool is_task, Problem *problem) {
-    Bytes command = {0}, answer;
-    bytes_format(&command, "scancel\n%s%s", is_task ? "" : "--name=", name);
-    const Status status = slurm_run(&command, &answer, problem);
-    bytes_clear(&answer);
+    Bytes text = {0};
+    bytes_format(&text, "scancel\n%s%s", is_task ? "" : "--name=", name);
+    const Status status = slurm_run(&text, problem);
+    bytes_clear(&text);
     return status;
 }
 
@@ -140,22 +141,22 @@ static void facts_read_nodes(char *text, SlurmFacts *facts) {
 }
 
 Status slurm_facts(const SlurmSettings *settings, SlurmFacts *facts, Problem *problem) {
-    Bytes command = {0}, answer;
+    Bytes text = {0};
     *facts = (SlurmFacts){.array_max = ARRAY_MAX};
-    bytes_text(&command, "sinfo\n--noheader\n--noconvert\n--format=%T|%C|%E");
+    bytes_text(&text, "sinfo\n--noheader\n--noconvert\n--format=%T|%C|%E");
     if (settings->partition != NULL)
-        bytes_format(&command, "\n--partition=%s", settings->partition);
-    Status status = slurm_run(&command, &answer, problem);
+        bytes_format(&text, "\n--partition=%s", settings->partition);
+    Status status = slurm_run(&text, problem);
     if (status == STATUS_OK)
-        facts_read_nodes(answer.at, facts);
-    bytes_clear(&answer);
+        facts_read_nodes(text.at, facts);
+    bytes_clear(&text);
     TRY(status);
-    bytes_text(&command, "scontrol\nshow\nconfig");
-    status = slurm_run(&command, &answer, problem);
-    const char *line = status == STATUS_OK ? strstr(answer.at, "MaxArraySize") : NULL;
+    bytes_text(&text, "scontrol\nshow\nconfig");
+    status = slurm_run(&text, problem);
+    const char *line = status == STATUS_OK ? strstr(text.at, "MaxArraySize") : NULL;
     const char *value = line != NULL ? strchr(line, '=') : NULL;
     if (value != NULL && strtoul(value + 1, NULL, 10) > 1)
         facts->array_max = strtoul(value + 1, NULL, 10);
-    bytes_clear(&answer);
+    bytes_clear(&text);
     return status;
 }
