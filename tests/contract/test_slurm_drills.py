@@ -3,6 +3,7 @@
 After each nothing is lost, twice or wrong: the answer is to the byte that of threads, no task is queued, no file is left."""
 
 import contextlib
+import hashlib
 import os
 import shutil
 import signal
@@ -14,7 +15,7 @@ import time
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 from disk import fill, small_disk  # noqa: E402
-from site_of_slurm import ensemble, main, site, slow_sweep, sweep, wanted  # noqa: E402
+from site_of_slurm import ensemble, main, site, slow_sweep, sweep, tasks_of, wanted  # noqa: E402
 from slurm import until  # noqa: E402
 
 NIGHTLY = True
@@ -290,6 +291,30 @@ def test_a_shared_folder_that_is_away():
             os.rename(at.shared + ".away", at.shared)
             at.slurm.open_gate()
             at.ends_well()
+
+
+def test_digits_of_another_machine():
+    """A chunk whose runs differ in one bit, its digest right: the server's own run tells, and the chunk is made again."""
+    for scene in (sweep(), ensemble()):
+        with site() as at:
+            at.slurm.close_gate()
+            at.begin(scene)
+            at.until(all_are_sent)
+            at.kill()
+            at.slurm.open_gate()
+            until(lambda: not at.slurm.tasks(), "tasks that do not end")
+            with open(os.path.join(at.shared, at.name(), "chunks", "0"), "r+b") as file:
+                body = bytearray(file.read()[:-32])
+                place = 56  # behind the head: each part is a length and its bytes, of which the steps begin at 24
+                while place < len(body):
+                    body[place + 8 + 24] ^= 1
+                    place += 8 + int.from_bytes(body[place:place + 8], "little")
+                file.seek(0)
+                file.write(bytes(body) + hashlib.sha256(body).digest())
+            at.start()
+            at.ends_well()
+            assert "other digits" in at.daemon.stderr(), at.daemon.stderr()
+            assert [list(tasks_of(call)) for call in at.slurm.calls("sbatch")[1:]] == [[0]], at.slurm.calls("sbatch")
 
 
 def test_options_that_would_hide_the_tasks():
