@@ -14,6 +14,7 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from daemon import Daemon  # noqa: E402
 from disk import fill, small_disk  # noqa: E402
 from site_of_slurm import ensemble, main, site, slow_sweep, sweep, tasks_of, wanted  # noqa: E402
 from slurm import until  # noqa: E402
@@ -315,6 +316,22 @@ def test_digits_of_another_machine():
             at.ends_well()
             assert "other digits" in at.daemon.stderr(), at.daemon.stderr()
             assert [list(tasks_of(call)) for call in at.slurm.calls("sbatch")[1:]] == [[0]], at.slurm.calls("sbatch")
+
+
+def test_two_servers_with_one_folder():
+    """Each makes the same study: a cancel at the one, and its tidying up, leave the other's tasks and files alone."""
+    with site() as at, Daemon(program.build, *at.options, environment=at.slurm.environment) as other:
+        at.slurm.close_gate()
+        at.begin(sweep())
+        at.until(all_are_sent)
+        job = other.submit(sweep(), headers={"Prefer": "respond-async"}).json()["id"]
+        until(lambda: len(at.slurm.tasks()) == 24, at.slurm.tasks)
+        assert len(os.listdir(at.shared)) == 2
+        assert other.request("DELETE", f"/v1/jobs/{job}").status in (200, 204)
+        until(lambda: len(at.slurm.tasks()) == 12 and len(os.listdir(at.shared)) == 1, at.slurm.tasks)
+        at.slurm.open_gate()
+        at.ends_well()
+        assert len(at.slurm.calls("sbatch")) == 2, at.slurm.calls("sbatch")
 
 
 def test_options_that_would_hide_the_tasks():
