@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Damaged databases: answers are right or problems, and the daemon does not end. The long run is tests/damage/damage.py."""
 
+import contextlib
+import http.client
 import os
 import sqlite3
 import sys
@@ -129,6 +131,24 @@ def test_rows_of_sweeps_measurements_and_audit_entries_have_checksums():
             code, said, _ = program.run("check-db", "--data", folder)
             assert code == 1 or "DELETE" in sql, (sql, said)
             damage.shutil.rmtree(folder)
+
+
+def test_a_cut_index_of_the_log_loses_nothing():
+    """impactd.db-shm is cut while in use, which can end the server: the next one has what was acknowledged, and makes the file anew."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene, jobs = program.scene("paper_free_sponge"), []
+        with program.Daemon(program.build, data=folder) as daemon:
+            with contextlib.suppress(OSError, http.client.HTTPException):
+                for number in range(20):
+                    if number == 10:
+                        os.truncate(os.path.join(folder, "impactd.db-shm"), 0)
+                    scene["dampers"][0]["clearance"] = 0.012 + 1e-4 * number
+                    jobs.append(program.finished(daemon, scene)["id"])
+            daemon.kill()
+        assert len(jobs) >= 10, jobs
+        with program.daemon(data=folder) as daemon:
+            assert [daemon.get(f"/v1/jobs/{job}").json()["status"] for job in jobs] == ["successful"] * len(jobs)
+        assert program.run("check-db", "--data", folder)[0] == 0
 
 
 def test_a_manifest_does_not_hide_a_damaged_material():
