@@ -134,7 +134,7 @@ part_kills() {
 
 part_cluster() {
     build release
-    # Dead daemons and nodes, wrong files, full disks, a Slurm that refuses, errs or is away. 300 s
+    # Dead daemons and nodes, wrong files, full disks, a Slurm that refuses, errs or is away. 900 s
     sized killed_before '' "$python" tests/contract/test_slurm_drills.py --build build
     # 1e6 scenes end to end. 900 s
     sized '--scenes 3000' '--scenes 1000000 --duration 10' "$python" tests/bench/bench_slurm.py --build build
