@@ -12,7 +12,8 @@
 
 #include "server/util/clock.h"
 
-enum { CHAIN_MAX = 32 };
+// libtasn1 crashes where an allocation of its own fails; 31 certificates and a key take 330 kB.
+enum { CHAIN_MAX = 32, TLS_BYTES = 1 << 20 };
 
 typedef struct Certificate {
     struct Certificate *before;
@@ -78,6 +79,10 @@ Status tls_use(const char *cert, const char *cert_path, const char *key, const c
                Problem *problem) {
     const gnutls_datum_t cert_text = {(unsigned char *)cert, (unsigned)strlen(cert)};
     const gnutls_datum_t key_text = {(unsigned char *)key, (unsigned)strlen(key)};
+    void *reserve = malloc(TLS_BYTES);
+    free(reserve);
+    if (reserve == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the certificate");
     TRY(tls_check(cert, cert_path, key, key_path, problem));
     Certificate *made = calloc(1, sizeof *made);
     if (made == NULL)

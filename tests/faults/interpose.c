@@ -51,7 +51,7 @@ static size_t folder_length;
 static _Atomic bool is_inside[MAX_FILES]; // by descriptor
 
 // Code of libraries that abort or crash when an allocation of theirs fails, by themselves: these are left out.
-static const char *const fragile[] = {"libfftw3", "libsundials", "libnlopt", "liblapack", "libblas", "libopenblas"};
+static const char *const fragile[] = {"libfftw3", "libsundials", "libnlopt", "liblapack", "libblas", "libopenblas", "libtasn1"};
 enum { FRAGILE = sizeof fragile / sizeof *fragile, MAX_RANGES = 64 };
 static struct {
     uintptr_t from, to;
