@@ -119,6 +119,12 @@ static Status chirp_make(const Excitation *excitation, const Span *span, const P
     return STATUS_OK;
 }
 
+static void chirp_band(const Excitation *excitation, double band[2]) {
+    const ExcitationChirp *chirp = chirp_of(excitation);
+    band[0] = 2 * (double)PI * fmin(chirp->start_frequency, chirp->end_frequency);
+    band[1] = 2 * (double)PI * chirp_highest(chirp);
+}
+
 static double chirp_fastest(const Excitation *excitation) {
     return chirp_of(excitation)->rate;
 }
@@ -143,6 +149,7 @@ const ExcitationKind excitation_chirp = {
              chirp_fields, sizeof(ExcitationChirp)},
     .complete = chirp_complete,
     .fastest = chirp_fastest,
+    .band = chirp_band,
     .interval = chirp_interval,
     .lasts = chirp_lasts,
     .effort = 1.5,

@@ -32,6 +32,8 @@ typedef struct ExcitationKind {
                        Problem *problem);
     // The highest frequency of the base's motion [rad/s]. NULL: no higher than its samples show.
     double (*fastest)(const Excitation *excitation);
+    // The lowest and the highest of the base's main frequencies [rad/s]. NULL: unknown.
+    void (*band)(const Excitation *excitation, double band[2]);
     // Between the samples of the base [s]. NULL: the base has a closed form.
     double (*interval)(const Excitation *excitation);
     // The time of its last sample [s]. NULL: the end of the run.

@@ -63,10 +63,15 @@ static Base half_sine_form(const Excitation *excitation) {
                   .piece_count = 2};
 }
 
+static void pulse_band(const Excitation *excitation, double band[2]) {
+    band[0] = band[1] = 3.14159265358979323846 / pulse_of(excitation)->length;
+}
+
 const ExcitationKind excitation_half_sine = {
     .kind = {"half_sine", "half a sine of the base's acceleration, once", pulse_fields,
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
+    .band = pulse_band,
     .amplitude = offsetof(ExcitationPulse, amplitude),
     .form = half_sine_form,
     .doubt = pulse_doubt,
@@ -88,6 +93,7 @@ const ExcitationKind excitation_triangular = {
     .kind = {"triangular", "a triangular pulse of the base's acceleration, once", pulse_fields,
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
+    .band = pulse_band,
     .amplitude = offsetof(ExcitationPulse, amplitude),
     .form = triangular_form,
     .doubt = pulse_doubt,

@@ -214,12 +214,18 @@ static double random_interval(const Excitation *excitation) {
     return 1 / random_of(excitation)->rate;
 }
 
+static void random_band(const Excitation *excitation, double band[2]) {
+    for (int i = 0; i < 2; i++)
+        band[i] = 2 * PI * random_of(excitation)->band.at[i];
+}
+
 const ExcitationKind excitation_random = {
     .kind = {.name = "random",
              .doc = "band-limited Gaussian acceleration of the base, the same for the same seed",
              .fields = random_fields,
              .size = sizeof(ExcitationRandom)},
     .complete = random_complete,
+    .band = random_band,
     .interval = random_interval,
     .effort = 0.06,
     .amplitude = offsetof(ExcitationRandom, rms),

@@ -219,11 +219,26 @@ static double record_lasts(const Excitation *excitation) {
     return record_interval(record) * (double)record_samples(record)->count;
 }
 
+// The rate of a sine whose samples differ as much from each other as these do.
+static void record_band(const Excitation *excitation, double band[2]) {
+    const ExcitationRecord *record = record_of(excitation);
+    const Reals *samples = record_samples(record);
+    double squares = 0, changes = 0;
+    for (size_t i = 1; i < samples->count; i++) {
+        const double change = samples->at[i] - samples->at[i - 1];
+        squares += samples->at[i] * samples->at[i];
+        changes += change * change;
+    }
+    band[0] = 0;
+    band[1] = squares > 0 ? sqrt(3 * changes / squares) / record_interval(record) : 0;
+}
+
 const ExcitationKind excitation_record = {
     .kind = {"record", "a measured base acceleration", record_fields, sizeof(ExcitationRecord)},
     .check = record_check,
     .complete = record_complete,
     .interval = record_interval_of,
+    .band = record_band,
     .lasts = record_lasts,
     .effort = 0.05,
     .make = record_make,

@@ -59,6 +59,10 @@ static double sine_fastest(const Excitation *excitation) {
     return sine_omega(sine_of(excitation));
 }
 
+static void sine_band(const Excitation *excitation, double band[2]) {
+    band[0] = band[1] = sine_fastest(excitation);
+}
+
 static void sine_doubt(const Excitation *excitation, const Span *span, const char *pointer,
                        Problem *doubts) {
     excitation_doubt_frequency(sine_of(excitation)->frequency, span, pointer, "frequency", doubts);
@@ -69,6 +73,7 @@ const ExcitationKind excitation_sine = {
              sizeof(ExcitationSine)},
     .complete = sine_complete,
     .fastest = sine_fastest,
+    .band = sine_band,
     .amplitude = offsetof(ExcitationSine, amplitude),
     .form = sine_form,
     .doubt = sine_doubt,

@@ -54,7 +54,7 @@ static double structure_largest_circle(size_t n, const double *mass, const doubl
 Status structure_rates(const Structure *structure, size_t modes, StructureRates *rates) {
     const size_t n = structure_storeys(structure);
     double *room = calloc(n, (3 * n + 2) * sizeof *room);
-    *rates = (StructureRates){0, 0};
+    *rates = (StructureRates){0};
     if (room == NULL)
         return STATUS_NO_MEMORY;
     const StructureMatrices all = {room, room + n * n, room + 2 * n * n, room + 3 * n * n};
@@ -67,7 +67,11 @@ Status structure_rates(const Structure *structure, size_t modes, StructureRates 
         const double decay = !isnan(structure->damping_ratio) ? 2 * structure->damping_ratio * own
                              : modes < n                      ? 0
                                          : structure_largest_circle(n, all.mass, all.damping);
-        *rates = (StructureRates){has_slowest ? sqrt(squares[0]) : 0, fmax(own, decay)};
+        const double slowest = has_slowest ? sqrt(squares[0]) : 0;
+        const double ratio = !isnan(structure->damping_ratio) ? structure->damping_ratio
+                             : n == 1 && slowest > 0 ? all.damping[0] / all.mass[0] / 2 / slowest
+                                                     : 0;
+        *rates = (StructureRates){slowest, fmax(own, decay), ratio};
     }
     free(room);
     return status == STATUS_NO_MEMORY ? status : STATUS_OK;

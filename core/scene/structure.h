@@ -74,8 +74,9 @@ void structure_assemble(const Structure *structure, const StructureMatrices *mat
 
 // Rates of the `modes` slowest modes of a completed structure, SIZE_MAX: of all [rad/s].
 typedef struct StructureRates {
-    double slowest; // the first natural frequency; 0 if a motion has none
-    double fastest; // the last one or, of all modes, a bound on the decay if that is faster
+    double slowest;       // the first natural frequency; 0 if a motion has none
+    double fastest;       // the last one or, of all modes, a bound on the decay if that is faster
+    double damping_ratio; // of all modes, or of the only one; 0: none, or not known
 } StructureRates;
 Status structure_rates(const Structure *structure, size_t modes, StructureRates *rates);
 

@@ -8,9 +8,9 @@ static const double TURN = 6.28318530717958647693;
 
 // Steps of the engine for one mass: a sample, a Taylor step, and an impact with the flight before
 // and after it.
-static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, ARC = 8, IMPACT = 50;
-// A value of a channel: 2 ns a byte for memory that is new to the process, and its sum over modes.
-static const double VALUE = 0.5, VALUE_MODE = 0.04;
+static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, IMPACT = 50;
+// A value of a channel: 1 ns a byte for memory that is new to the process, and its sum over modes.
+static const double VALUE = 0.25, VALUE_MODE = 0.04;
 // CPU time of a step that the solvers count, over SOLVER_STEP: exact, exact with a power law, and
 // solvers that step. Measured by tests/bench/bench_cost.c.
 static const double EXACT_STEP = 0.65, POWER_STEP = 0.75, STEPPED_STEP = 1.15;
@@ -26,15 +26,21 @@ static const double RUN = 200; // plan, memory and summary
 static const double RUN_BYTES = 1e5;
 static const double FRAME_ARCS = 14, BLOW_ARCS = 5; // Taylor steps of a contact, of an impulse
 static const double NEIGHBOUR = 1.6; // a frame with dampers and its companion until they diverge
-static const double IMPACTS_A_CYCLE = 2;
-static const double REACHING = 0.6;   // share of fast flight that no bound keeps from the stops
-static const double FREE_CYCLES = 30; // after these free vibration does not reach the stops
+static const double REACHING = 0.6;  // share of fast flight that no bound keeps from the stops
 
-// Masses whose clearance is small beside the motion stay in contact: half of the time where it is
-// 1 / SMALL of the motion. Steps for a radian of their fastest motion, under linear and power laws.
-static const double SMALL = 500, HELD_ARCS = 1.2, HELD_POWER = 0.5;
-static const double POWER_STEPS = 12;    // of a contact under a power law
-static const double HELD_ADAPTIVE = 150; // steps of a radian by the adaptive solver
+// One mass over a sample interval too long for blocks, and pressed against a stiff stop.
+static const double LONG_SAMPLE = 8, HELD_SAMPLE = 90, HELD_RADIAN = 1.7, PIECE = 5,
+                    LONG_FLIGHT = 2;
+static const double FEW_RADIANS = 24; // of a sample interval in contact, without the event engine
+static const double BLOCK_RADIANS = 0.125; // the longest interval for blocks (core/solve/lanes.c)
+static const double RESONANT = 1.25;       // from a band's edge to a frequency that it excites
+static const double FREE_CYCLES = 30;      // vibration lasts at least so long
+// An impulse is followed by others down to this speed, as a part of that of the motion.
+static const double SLOWEST_BOUNCE = 1e-9;
+static const double BOUNCES_MAX = 1e4;
+// Steps for a radian of a contact's motion, under linear and power laws.
+static const double HELD_ARCS = 1.2, HELD_POWER = 0.5;
+static const double POWER_STEPS = 12; // of a contact under a power law
 
 // A contact under a power law: the share that does not depend on the tolerance, and the digits of
 // full accuracy.
@@ -50,20 +56,6 @@ static const double PLANNING = 8000, PRIME_PLANNING = 0.5; // steps; share of a 
 // Bytes per sample of a segment without and with a large prime factor (FFTW, window and sums).
 static const double SEGMENT_BYTES = 48, PRIME_BYTES = 96;
 static const double IMPACTS_KEPT = 1e5; // limit of the estimate of memory for impacts
-
-// Taylor steps of flight where the fastest motion is shorter than a sample interval. There no bound
-// shows that the stops are out of reach, and coupled modes have no closed form for a whole
-// interval.
-static double cost_flight_arcs(const Scene *scene, const StructureRates *rates) {
-    const Excitation *excitation = scene_excitation(scene);
-    double rate = rates->fastest;
-    if (excitation_kind(excitation)->fastest != NULL)
-        rate = fmax(rate, excitation_kind(excitation)->fastest(excitation));
-    const Structure *structure = scene_structure(scene);
-    const bool is_by_arcs = scene->dampers.count > 0 ||
-                            (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
-    return is_by_arcs && rate > scene->sample_rate ? REACHING * rate * scene->duration : 0;
-}
 
 // Samples of the base within the run.
 static double cost_base_samples(const Simulation *simulation) {
@@ -99,67 +91,140 @@ static double cost_base(const Simulation *simulation, double *bytes) {
            (ceil(samples / hop) + 1) * ((double)blocks.bins * NORMAL_PAIR + transform);
 }
 
-// Each kink of the base between samples ends a Taylor step and starts another.
-static double cost_base_arcs(const Simulation *simulation) {
+// Kinks of the base lie between samples.
+static bool cost_is_kinked(const Simulation *simulation) {
     const double ratio =
         simulation_base_interval(simulation) * simulation->scene.sample_rate; // in sample intervals
-    if (!(ratio > 0) || (ratio > 0.5 && fabs(ratio - nearbyint(ratio)) < 1e-9 * ratio))
-        return 0;
-    return cost_base_samples(simulation) * (ratio < 1 ? 1 + ratio : 2);
+    return ratio > 0 && !(ratio > 0.5 && fabs(ratio - nearbyint(ratio)) < 1e-9 * ratio);
 }
 
-static double cost_impacts(const Scene *scene, const StructureRates *rates) {
-    const bool is_free = excitation_kind(scene_excitation(scene)) == &excitation_free;
-    // Without a spring there is one slow movement.
-    double rate = rates->slowest > 0 ? rates->slowest : TURN / scene->duration;
-    const Excitation *excitation = scene_excitation(scene);
-    if (excitation_kind(excitation)->fastest != NULL)
-        rate = fmax(rate, fmin(excitation_kind(excitation)->fastest(excitation), 3 * rate));
-    // Masses on a frame respond to its higher modes too.
-    rate *= sqrt((double)structure_storeys(scene_structure(scene)));
-    const double cycles = rate / TURN * scene->duration;
-    return IMPACTS_A_CYCLE * (is_free ? fmin(cycles, FREE_CYCLES) : cycles) *
-           (double)scene->dampers.count;
-}
-
-// About the largest displacement, if dampers did not change it.
-static double cost_motion(const Scene *scene, const StructureRates *rates) {
+// A base in closed form that moves all the time [rad/s]; 0: another one.
+static double cost_base_rate(const Scene *scene) {
     const Excitation *excitation = scene_excitation(scene);
     const ExcitationKind *kind = excitation_kind(excitation);
-    const double slowest = fmax(rates->slowest, 1 / scene->duration);
-    double motion = 0, amplitude = 1;
+    return kind->interval == NULL && kind->fastest != NULL ? kind->fastest(excitation) : 0;
+}
+
+// The fastest motion in flight [rad/s].
+static double cost_fastest(const Scene *scene, const StructureRates *rates) {
+    return fmax(rates->fastest, cost_base_rate(scene));
+}
+
+// Taylor steps of flight. Kinks between samples end a step and start another, and then no interval
+// is taken as a whole; nor is it where the fastest motion is shorter than an interval: there no
+// bound shows that the stops are out of reach, and coupled modes have no closed form.
+static double cost_flight_arcs(const Simulation *simulation, const StructureRates *rates) {
+    const Scene *scene = &simulation->scene;
+    const double rate = cost_fastest(scene, rates);
+    if (cost_is_kinked(simulation))
+        return 2 * cost_base_samples(simulation) + scene->duration * fmax(scene->sample_rate, rate);
+    const Structure *structure = scene_structure(scene);
+    const bool is_by_arcs = scene->dampers.count > 0 ||
+                            (structure_storeys(structure) > 1 && isnan(structure->damping_ratio));
+    return is_by_arcs && rate > scene->sample_rate ? REACHING * rate * scene->duration : 0;
+}
+
+// A motion as one sine.
+typedef struct CostMotion {
+    double amplitude; // without dampers [m]
+    double rate;      // [rad/s]
+    double lasts;     // [s]
+} CostMotion;
+
+// The structure's own vibration, and the base's as it carries the structure along.
+static void cost_motions(const Scene *scene, const StructureRates *rates, CostMotion motions[2]) {
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    const double damping = rates->damping_ratio, duration = scene->duration;
+    const double own = fmax(rates->slowest, 1 / duration), start = fmin(rates->slowest / own, 1);
+    const bool is_driven = kind->interval != NULL || kind->fastest != NULL;
+    double amplitude = 0, base = kind == &excitation_free ? 0 : 1, band[2] = {0};
     for (size_t i = 0; i < excitation->displacement.count; i++)
-        motion = fmax(motion, fabs(excitation->displacement.at[i]));
+        amplitude = fmax(amplitude, fabs(excitation->displacement.at[i]));
     for (size_t i = 0; i < excitation->velocity.count; i++)
-        motion = fmax(motion, fabs(excitation->velocity.at[i]) / slowest);
+        amplitude = fmax(amplitude, fabs(excitation->velocity.at[i]) / own);
     if (kind->amplitude != 0)
-        amplitude = *(const double *)(const void *)((const char *)excitation + kind->amplitude);
-    return kind == &excitation_free ? motion : fmax(motion, fabs(amplitude) / (slowest * slowest));
-}
-
-// The fastest motion in contacts of a damper [rad/s]; 0: it is unknown.
-static double cost_contact_rate(const Damper *damper, Side side) {
-    const Buffer *buffer = damper_buffer(damper, side);
-    if (buffer->contact_time > 0)
-        return TURN / 2 / buffer->contact_time;
-    return buffer->stiffness > 0 ? sqrt(buffer->stiffness / damper->mass) : 0;
-}
-
-// Time in contact as a share of the run, of the mass that is in contact longest, and the radians of
-// its motion in a second.
-static double cost_held(const Scene *scene, const StructureRates *rates, double *radians) {
-    const double motion = cost_motion(scene, rates);
-    double longest = 0;
-    *radians = 0;
-    for (size_t i = 0; i < scene->dampers.count && motion > 0; i++) {
-        const Damper *damper = &scene->dampers.at[i];
-        const double ratio = SMALL * damper->clearance / motion;
-        const double share = 1 / (1 + ratio * ratio);
-        longest = fmax(longest, share);
-        for (Side side = SIDE_LEFT; side <= SIDE_RIGHT; side++)
-            *radians = fmax(*radians, share * cost_contact_rate(damper, side));
+        base = fabs(*(const double *)(const void *)((const char *)excitation + kind->amplitude));
+    if (kind->band != NULL)
+        kind->band(excitation, band);
+    // The root mean square of its frequencies.
+    const double pace = sqrt((band[0] * band[0] + band[0] * band[1] + band[1] * band[1]) / 3);
+    double gain = own / fmax(pace, own);
+    if (is_driven && band[0] < RESONANT * own &&
+        own < RESONANT * band[1]) // as far as there is time
+        gain = sqrt(gain * fmax(fmin(damping > 0 ? 1 / damping : INFINITY, own * duration), 1));
+    motions[0] =
+        (CostMotion){fmax(amplitude, start * start * gain * base / (own * own)), own, duration};
+    if (!is_driven && damping > 0) { // it dies away
+        double least = INFINITY;
+        for (size_t i = 0; i < scene->dampers.count; i++)
+            least = fmin(least, scene->dampers.at[i].clearance);
+        const double fades = log(fmax(motions[0].amplitude / least, 1)) / (damping * own);
+        motions[0].lasts = fmin(duration, fmax(fades, FREE_CYCLES * TURN / own));
     }
-    return longest;
+    const double carried = pow(fmin(own / pace, 1), 2);
+    motions[1] = pace > 0 ? (CostMotion){carried * base / (pace * pace), pace,
+                                         is_driven ? duration : fmin(duration, TURN / 2 / pace)}
+                          : (CostMotion){0};
+}
+
+// Work of contacts.
+typedef struct CostContacts {
+    double impacts; // of all masses
+    double held;    // time in contact, of the mass that is in contact longest [s]
+    double radians; // of a contact's motion, of the mass with the most
+} CostContacts;
+
+// A mass against the stop that pushes it leaves when the motion slows down, crosses to the other
+// stop and bounces there until it rests: all in phases of the motion, of which half a cycle is PI.
+static void cost_add_contact(const Damper *damper, Side side, bool is_impulse,
+                             const CostMotion *motion, CostContacts *work) {
+    const Buffer *buffer = damper_buffer(damper, side);
+    const double half = TURN / 2, e = fmin(fmax(buffer->restitution, 1e-3), 1 - 1e-6);
+    const double crossing = cbrt(12 * damper->clearance / motion->amplitude);
+    if (!(motion->amplitude > 0) || !(motion->rate > 0) || crossing > 2 * half)
+        return;
+    const double contact = is_impulse                 ? 0
+                           : buffer->contact_time > 0 ? half / buffer->contact_time
+                           : buffer->stiffness > 0    ? sqrt(buffer->stiffness / damper->mass)
+                                                      : 0;
+    const double speed = fmin(crossing * crossing / 2, 2);     // of approach, relative
+    const double first = 2 * speed * e, all = first / (1 - e); // bounces: the first one, all
+    const double room = fmax(half - crossing, 0);
+    const double slowest = contact > 0 ? motion->rate / contact : SLOWEST_BOUNCE;
+    double bounces = speed > slowest ? log(speed / slowest) / -log(e) : 0;
+    if (all > room)
+        bounces = fmin(bounces, first > 0 ? log(1 - room / all) / log(e) : 0);
+    const double held = fmax(room - all, 0) / half * motion->lasts;
+    const double halves = motion->rate * motion->lasts / half;
+    work->impacts = halves * (1 + fmin(bounces, BOUNCES_MAX)) / 2;
+    work->held = held;
+    work->radians = (held + work->impacts * (contact > 0 ? half / contact : 0)) * contact;
+}
+
+static CostContacts cost_contacts(const Simulation *simulation, const StructureRates *rates) {
+    const Scene *scene = &simulation->scene;
+    const bool is_impulse = simulation_law(simulation)->form == CONTACT_IMPULSIVE;
+    CostMotion motions[2];
+    CostContacts sum = {0};
+    cost_motions(scene, rates, motions);
+    // Masses on a frame respond to its higher modes too.
+    const double modes = sqrt((double)structure_storeys(scene_structure(scene)));
+    for (size_t i = 0; i < scene->dampers.count; i++) {
+        CostContacts most = {0};
+        for (size_t k = 0; k < 4; k++) {
+            CostContacts one = {0};
+            cost_add_contact(&scene->dampers.at[i], (Side)(k % 2), is_impulse, &motions[k / 2],
+                             &one);
+            most.impacts = fmax(most.impacts, 2 * one.impacts);
+            most.held = fmax(most.held, one.held);
+            most.radians = fmax(most.radians, one.radians);
+        }
+        sum.impacts += modes * most.impacts;
+        sum.held = fmax(sum.held, most.held);
+        sum.radians = fmax(sum.radians, most.radians);
+    }
+    return sum;
 }
 
 // plan_is_single() without a plan.
@@ -187,41 +252,47 @@ double cost_step(const Simulation *simulation) {
 }
 
 // Steps that the exact solver counts.
-static double cost_exact_steps(const Simulation *simulation, bool *is_fast) {
+static double cost_exact_steps(const Simulation *simulation, const StructureRates *rates,
+                               const CostContacts *work, bool *is_fast) {
     const Scene *scene = &simulation->scene;
     const Structure *structure = scene_structure(scene);
     const size_t n = simulation_modes(simulation, structure_storeys(structure)),
                  m = scene->dampers.count;
     const bool is_coupled = n > 1 && isnan(structure->damping_ratio);
-    StructureRates rates;
-    if (structure_rates(structure, n, &rates) != STATUS_OK)
-        rates = (StructureRates){0}; // without memory: the run reports it
-    const double samples = (double)scene_sample_count(scene);
-    double radians;
-    const double held = cost_held(scene, &rates, &radians);
+    const double samples = (double)scene_sample_count(scene), rate = scene->sample_rate;
+    const double held = work->held * rate, fast = cost_fastest(scene, rates) / rate; // in samples
     const ContactForm form = simulation_law(simulation)->form;
-    double arcs = cost_flight_arcs(scene, &rates) + cost_base_arcs(simulation);
-    // One mass in contact has a closed form for each sample interval.
-    if (form == CONTACT_LINEAR)
-        arcs += cost_is_single(scene) ? held * samples : HELD_ARCS * radians * scene->duration;
-    const double impacts = cost_impacts(scene, &rates);
+    double arcs = cost_flight_arcs(simulation, rates);
     *is_fast = arcs > samples;
-    if (cost_is_single(scene))
-        return samples * (m > 0 ? SAMPLE_NEAR_STOPS : SAMPLE) + ARC * arcs + IMPACT * impacts;
-    const double digits = -log10(exact_tolerance(simulation_settings(simulation)));
     const double arc = step_work_steps(STEP_WORK_ARC, n, m, is_coupled);
     const double event = step_work_steps(STEP_WORK_EVENT, n, m, is_coupled);
     const double flight = step_work_steps(STEP_WORK_FLIGHT, n, m, is_coupled);
+    if (cost_is_single(scene)) {
+        const bool has_blocks = fast < BLOCK_RADIANS;
+        const double sample = has_blocks ? (m == 0 ? SAMPLE : SAMPLE_NEAR_STOPS)
+                                         : (m == 0 ? LONG_FLIGHT * flight : LONG_SAMPLE);
+        const double stiff = held > 0 ? work->radians / held : 0; // radians of a sample in contact
+        const double pressed = stiff < 1             ? 0
+                               : stiff < FEW_RADIANS ? 2 * PIECE
+                                                     : HELD_SAMPLE * (1 + HELD_RADIAN * fast);
+        return samples * sample + held * pressed + (m > 0 || has_blocks ? PIECE : arc) * arcs +
+               IMPACT * work->impacts;
+    }
+    // One mass in contact has a closed form for each sample interval.
+    if (form == CONTACT_LINEAR)
+        arcs += fmin(HELD_ARCS * work->radians, m == 1 ? HELD_SAMPLE / arc * held : INFINITY);
+    else if (form == CONTACT_IMPULSIVE)
+        arcs += held;
+    const double digits = -log10(exact_tolerance(simulation_settings(simulation)));
     const double contact = form == CONTACT_POWER
                                ? step_work_steps(STEP_WORK_POWER, n, m, is_coupled) *
                                      (EASY + (1 - EASY) * digits / DIGITS)
                            : form == CONTACT_IMPULSIVE ? BLOW_ARCS * arc
                                                        : FRAME_ARCS * arc;
-    const double steps =
-        form == CONTACT_POWER ? held * samples + HELD_POWER * radians * scene->duration : 0;
+    const double steps = form == CONTACT_POWER ? held + HELD_POWER * work->radians : 0;
     return (m > 0 ? NEIGHBOUR : 1) *
            (steps * step_work_steps(STEP_WORK_POWER, n, m, is_coupled) / POWER_STEPS +
-            samples * flight + arcs * arc + impacts * (contact + 2 * event + 2 * arc));
+            samples * flight + arcs * arc + work->impacts * (contact + 2 * event + 2 * arc));
 }
 
 double cost_truncation(const Simulation *simulation) {
@@ -241,23 +312,18 @@ double cost_truncation(const Simulation *simulation) {
 }
 
 // Steps of a solver with its own cost function.
-static double cost_own_steps(const Simulation *simulation) {
+static double cost_own_steps(const Simulation *simulation, const CostContacts *work) {
     Plan *plan;
     const size_t storeys = structure_storeys(scene_structure(&simulation->scene));
     if (plan_sketch(&simulation->scene, simulation_modes(simulation, storeys), &plan) != STATUS_OK)
         return 0; // the run reports why
     const Solver *solver = simulation_solver(simulation);
-    double steps = solver->cost(solver, simulation_settings(simulation),
-                                simulation_base_interval(simulation), plan);
+    const SolverDemand demand = {.base_interval = simulation_base_interval(simulation),
+                                 .base_rate = cost_base_rate(&simulation->scene),
+                                 .impacts = work->impacts,
+                                 .radians = work->radians};
+    const double steps = solver->cost(solver, simulation_settings(simulation), &demand, plan);
     plan_free(plan);
-    StructureRates rates;
-    if (solver == &solver_adaptive &&
-        structure_rates(scene_structure(&simulation->scene), SIZE_MAX, &rates) == STATUS_OK) {
-        // The others take steps of the same length in a contact.
-        double radians;
-        (void)cost_held(&simulation->scene, &rates, &radians);
-        steps += HELD_ADAPTIVE * radians * simulation->scene.duration;
-    }
     return steps;
 }
 
@@ -288,7 +354,7 @@ double cost_spectra(const SpectrumRequest *psd, size_t samples) {
 
 // Memory of series and hidden columns, of the base and its refinement, matrices, impacts, spectra
 // and their stored form.
-static void cost_add_bytes(const Simulation *simulation, Cost *cost) {
+static void cost_add_bytes(const Simulation *simulation, double impacts, Cost *cost) {
     const Scene *scene = &simulation->scene;
     const Output *output = &simulation->output;
     const SpectrumRequest *psd = &output->psd;
@@ -297,12 +363,9 @@ static void cost_add_bytes(const Simulation *simulation, Cost *cost) {
     const double refined = base > 0 && base < samples ? samples : 0;
     const double size =
         (double)structure_storeys(scene_structure(scene)) + (double)scene->dampers.count;
-    StructureRates rates;
-    if (structure_rates(scene_structure(scene), SIZE_MAX, &rates) != STATUS_OK)
-        rates = (StructureRates){0};
     cost->bytes = RUN_BYTES +
                   sizeof(double) * (samples * columns + base + refined + 60 * size * size) +
-                  sizeof(Impact) * fmin(cost_impacts(scene, &rates), IMPACTS_KEPT);
+                  (output->impacts ? sizeof(Impact) * fmin(impacts, IMPACTS_KEPT) : 0);
     if (psd->channels.count == 0)
         return;
     const double values = (double)(psd->channels.count + 1) * (double)(psd->segment / 2 + 1);
@@ -323,18 +386,22 @@ Cost cost_scene(const Simulation *simulation) {
     Cost cost = {.spectra = cost_spectra(&output->psd, scene_sample_count(scene)) +
                             channel * (double)output->psd.channels.count,
                  .output = channel * (double)output->channels.count};
+    const size_t all = structure_storeys(scene_structure(scene)),
+                 kept = simulation_modes(simulation, all);
+    StructureRates rates;
+    if (structure_rates(scene_structure(scene), kept, &rates) != STATUS_OK)
+        rates = (StructureRates){0}; // without memory: the run reports it
+    const CostContacts work = cost_contacts(simulation, &rates);
     double base_bytes;
     cost.base = cost_base(simulation, &base_bytes);
-    cost_add_bytes(simulation, &cost);
+    cost_add_bytes(simulation, work.impacts, &cost);
     cost.bytes += base_bytes;
-    if (simulation_modes(simulation, structure_storeys(scene_structure(scene))) <
-        structure_storeys(scene_structure(scene)))
-        cost.steps = cost_truncation(simulation);
-    cost.steps += RUN + cost.output + cost.spectra + cost.base + FRAME * modes +
-                  MODES * modes * modes * modes +
-                  cost_step(simulation) * (simulation_solver(simulation)->cost != NULL
-                                               ? cost_own_steps(simulation)
-                                               : cost_exact_steps(simulation, &cost.is_fast));
+    const double solver = simulation_solver(simulation)->cost != NULL
+                              ? cost_own_steps(simulation, &work)
+                              : cost_exact_steps(simulation, &rates, &work, &cost.is_fast);
+    cost.steps = RUN + cost.output + cost.spectra + cost.base + FRAME * modes +
+                 MODES * modes * modes * modes + cost_step(simulation) * solver +
+                 (kept < all ? cost_truncation(simulation) : 0);
     cost.cpu_seconds = cost.steps * SOLVER_STEP;
     return cost;
 }

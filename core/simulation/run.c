@@ -248,6 +248,14 @@ static double run_steps_max(const SimulationLimits *limits) {
     return limits == NULL ? 0 : SIMULATION_PATIENCE * limits->steps;
 }
 
+// Impacts whose list fits into the memory of a run.
+static size_t run_impacts_max(const SimulationLimits *limits) {
+    if (limits == NULL || !(limits->bytes > 0))
+        return limits == NULL ? 0 : limits->impacts;
+    const size_t fit = (size_t)fmin(limits->bytes / sizeof(Impact), (double)(SIZE_MAX / 2)) + 1;
+    return limits->impacts > 0 && limits->impacts < fit ? limits->impacts : fit;
+}
+
 // The predicted steps of the spectra count like those of the solver, so that the same scene stops
 // at the same place on any machine.
 static Status run_spectrum(RunContext *context, Problem *problem) {
@@ -355,7 +363,7 @@ static Status run_solve(RunContext *context, const Regime *regime, Workspace *wo
                .columns = context->wanted,
                .column_count = context->wanted_count,
                .statistics_from = simulation->output.statistics_from,
-               .impacts_max = limits == NULL ? 0 : limits->impacts,
+               .impacts_max = run_impacts_max(limits),
                .steps_max = run_steps_max(limits),
                .is_clear = regime->is_clear};
     TRY(solver->run(solver, &run, &outcome->response, problem));

@@ -39,6 +39,9 @@ static const double JUMP = 1e-9;         // relative, of a_g between two steps
 static const double SIMULTANEOUS = 1e-9; // dN/dt at a peak over that at the start of its step
 static const double ADVANCE_COST = 10;   // solver steps of a step without its derivatives
 static const double SCALE_MIN = 1e-290;  // an error weight must not be zero
+// Steps of a period of the fastest mode, of a radian of the base and of an event, over 10 to an
+// eighth of the digits (the method has order 8); of a radian in contact.
+static const double TURN_STEPS = 2, BASE_STEPS = 1, EVENT_STEPS = 7, CONTACT_STEPS = 0.5;
 
 typedef struct Adaptive {
     TimeStepping *stepping;
@@ -768,21 +771,22 @@ static Status adaptive_decide(const Solver *solver, const Accuracy *accuracy, do
         "a contact begins or ends, and a stop grazed within a step is missed");
 }
 
-// Steps for samples, kinks of the base and the fastest mode; a contact takes a number of steps that
-// depends on the tolerance. Assumed are seven contacts a second, and many of them simultaneous
-// where there are many dampers.
-static double adaptive_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
-                            const Plan *plan) {
+// Steps end at samples and at kinks of the base, and are as short as the fastest motion needs under
+// the tolerance; in contacts stability limits them.
+static double adaptive_cost(const Solver *solver, const Accuracy *accuracy,
+                            const SolverDemand *demand, const Plan *plan) {
     (void)solver;
-    const double digits = -log10(adaptive_tolerance(accuracy)), each = pow(10, digits / 8) / 2;
-    double setup, steps = plan->sample_rate;
-    if (base_interval > 0)
-        steps = fmax(steps, 1 / base_interval);
-    steps = fmax(steps, each / time_stepping_mode_time(plan)) +
-            7 * 25 * each * sqrt((double)plan->damper_count);
+    const double digits = -log10(adaptive_tolerance(accuracy)), each = pow(10, digits / 8);
+    double setup, ends = plan->sample_rate;
+    if (demand->base_interval > 0)
+        ends = fmax(ends, 1 / demand->base_interval);
+    const double mode = TURN_STEPS * each / time_stepping_mode_time(plan);
+    const double base = BASE_STEPS * each * demand->base_rate;
+    const double steps = fmax(ends, fmax(mode, base)) * plan->duration +
+                         CONTACT_STEPS * demand->radians + EVENT_STEPS * each * demand->impacts;
     const double one = adaptive_step_cost(plan_mode_count(plan), plan->damper_count,
                                           time_stepping_may_couple(plan), &setup);
-    return 3.3 * one * steps * plan->duration; // the companion takes more than twice as many
+    return 3.3 * one * steps; // the companion takes more than twice as many
 }
 
 // clang-format off

@@ -96,6 +96,14 @@ typedef struct Run {
 // STATUS_CANCELLED. `step` is that of a fixed step [s], or 0.
 Status run_check(const Run *run, double time, double step, bool is_finite, Problem *problem);
 
+// What a run is expected to ask of a solver.
+typedef struct SolverDemand {
+    double base_interval; // of a base known by samples, else 0 [s]
+    double base_rate;     // of a base in closed form [rad/s]; 0: slow
+    double impacts;       // of all masses
+    double radians;       // of the fastest motion in contacts
+} SolverDemand;
+
 // One solver. Its functions are called with the solver itself.
 typedef struct Solver {
     Kind kind;
@@ -106,8 +114,8 @@ typedef struct Solver {
     Status (*decide)(const struct Solver *solver, const Accuracy *accuracy, double base_interval,
                      Plan *plan, Problem *problem);
     // What a run costs, in solver steps. NULL: as the exact solver's.
-    double (*cost)(const struct Solver *solver, const Accuracy *accuracy, double base_interval,
-                   const Plan *plan);
+    double (*cost)(const struct Solver *solver, const Accuracy *accuracy,
+                   const SolverDemand *demand, const Plan *plan);
     // Erases the settings that a scene without a power law has no use for. NULL: there are none.
     void (*forget_unused)(Accuracy *accuracy, bool has_power_law);
     bool is_linear_only;           // serves no contact under a power law

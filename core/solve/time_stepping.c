@@ -458,12 +458,12 @@ Status time_stepping_decide(const Solver *solver, const Accuracy *accuracy, doub
     return STATUS_OK;
 }
 
-double time_stepping_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
-                          const Plan *plan) {
+double time_stepping_cost(const Solver *solver, const Accuracy *accuracy,
+                          const SolverDemand *demand, const Plan *plan) {
     double setup;
     const double each = solver->stepper->cost(plan_mode_count(plan), plan->damper_count,
                                               time_stepping_may_couple(plan), &setup);
-    const StepChoice choice = time_stepping_choose(plan, accuracy, base_interval);
+    const StepChoice choice = time_stepping_choose(plan, accuracy, demand->base_interval);
     const double steps = choice.share * plan->duration * plan->sample_rate;
     const double companion = choice.share == choice.kinks && choice.kinks > 1 ? 2 : 0.5;
     return (1 + companion) * each * steps + 2 * setup;

@@ -68,8 +68,8 @@ struct TimeStepping {
 Status time_stepping_run(const Solver *solver, Run *run, Response *response, Problem *problem);
 Status time_stepping_decide(const Solver *solver, const Accuracy *accuracy, double base_interval,
                             Plan *plan, Problem *problem);
-double time_stepping_cost(const Solver *solver, const Accuracy *accuracy, double base_interval,
-                          const Plan *plan);
+double time_stepping_cost(const Solver *solver, const Accuracy *accuracy,
+                          const SolverDemand *demand, const Plan *plan);
 
 // A run with `share` steps in a sample interval and its companion. `kinks` divides `share`: kinks
 // of the base in a sample interval. `tolerance` is that of error control, 0 for fixed steps.

@@ -144,7 +144,7 @@ TEST(what_takes_too_long_is_refused_where_it_helps_most) {
 TEST(what_takes_too_much_memory_is_refused) {
     const SimulationLimits limits = {.bytes = 1e6};
     refuse(SDOF "," DAMPER "," NO_PSD, &limits, 100, 1000, "/output/channels",
-           "would take about 4.11 MB of memory, at most 1 MB are allowed");
+           "would take about 4.1 MB of memory, at most 1 MB are allowed");
 }
 
 #define SPECTRUM                                                                                   \
