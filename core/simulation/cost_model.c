@@ -175,8 +175,9 @@ typedef struct CostContacts {
     double radians; // of a contact's motion, of the mass with the most
 } CostContacts;
 
-// A mass against the stop that pushes it leaves when the motion slows down, crosses to the other
-// stop and bounces there until it rests: all in phases of the motion, of which half a cycle is PI.
+// A mass against the stop that pushes it leaves when the motion X sin(p) slows down, crosses to the
+// other stop, where X (p - sin(p)) = 2 c, and bounces there until it rests: all in phases p, of
+// which half a cycle has PI. Speeds are relative to that of the motion, whose acceleration pushes.
 static void cost_add_contact(const Damper *damper, Side side, bool is_impulse,
                              const CostMotion *motion, CostContacts *work) {
     const Buffer *buffer = damper_buffer(damper, side);
@@ -188,7 +189,7 @@ static void cost_add_contact(const Damper *damper, Side side, bool is_impulse,
                            : buffer->contact_time > 0 ? half / buffer->contact_time
                            : buffer->stiffness > 0    ? sqrt(buffer->stiffness / damper->mass)
                                                       : 0;
-    const double speed = fmin(crossing * crossing / 2, 2);     // of approach, relative
+    const double speed = fmin(crossing * crossing / 2, 2);     // of approach
     const double first = 2 * speed * e, all = first / (1 - e); // bounces: the first one, all
     const double room = fmax(half - crossing, 0);
     const double slowest = contact > 0 ? motion->rate / contact : SLOWEST_BOUNCE;
