@@ -140,6 +140,7 @@ def main():
 
 
 def campaign(meter, arguments):
+    costly.upload(meter.daemon)
     every = []
     for number in range(arguments.first, arguments.first + arguments.count):
         if arguments.kind in costly.drawn(arguments.seed, number)[0]:

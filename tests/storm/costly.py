@@ -162,6 +162,12 @@ def study(dice, kind, made):
                                        "to": 20, "count": int(scattered(dice, 2, 200))},
                 "direction": dice.choice(["up", "both"]), "continuation": dice.random() < 0.3,
                 "settle_cycles": int(scattered(dice, 1, 1000)), "max_period": dice.choice([1, 2, 8])}
+    if kind == "fragility":
+        made.pop("excitation")
+        return {"kind": kind, "records": RECORDS[:dice.randint(1, len(RECORDS))],
+                "intensity": dice.choice(["pga", {"period": scattered(dice, 0.05, 2), "damping_ratio": 0.02}]),
+                "levels": {"from": 1, "to": 12, "count": int(scattered(dice, 2, 50))},
+                "limits": [{"metric": "peak_displacement", "value": 0.01}]}
     if kind == "optimize":
         found = {"kind": kind, "variables": [CLEARANCE, MASS][:dice.randint(1, 2)],
                  "objectives": [{"metric": name} for name in METRICS[:dice.randint(1, 2)]],
@@ -179,7 +185,15 @@ def study(dice, kind, made):
                           "samples": numbers(dice, count - 1, -0.02, 0.02)}]}
 
 
-STUDIES = ("sweep", "ensemble", "compare", "sensitivity", "tradeoff", "response", "optimize", "calibrate")
+STUDIES = ("sweep", "ensemble", "compare", "sensitivity", "tradeoff", "response", "optimize", "calibrate", "fragility")
+RECORDS = [f"costly_{number}" for number in range(4)]
+
+
+def upload(daemon):
+    """The records that fragility studies name."""
+    for name in RECORDS:
+        record = {"name": name, "interval": 0.01, "samples": numbers(random.Random(name), 2000, -3, 3)}
+        assert daemon.request("POST", "/v1/records", json=record).status == 201
 
 
 def drawn(seed, number):

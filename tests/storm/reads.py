@@ -90,6 +90,7 @@ def main():
     program.build = os.path.abspath(arguments.build)
     dice = random.Random(arguments.seed)
     with program.daemon() as daemon:
+        costly.upload(daemon)
         job = daemon.request("POST", "/v1/jobs", json=program.scene("paper_free_sponge"), headers={"Prefer": "wait=60"}).json()
         result = job["links"]["result"]
         paths = [result, f"{result}/series.json?points=1000", f"/v1/jobs/{job['id']}", "/v1/jobs?limit=20"]
