@@ -617,7 +617,9 @@ static Status calibrate_end_window(CalibrateWork *work) {
         work->is_beyond = true;
         if (work->window > 0)
             return calibrate_return(work);
-        work->ends[0] = work->limit = predictable * best->horizon;
+        // Not 0, which is no limit.
+        work->ends[0] = work->limit =
+            fmax(predictable * best->horizon, work->study->measured.at[0].interval);
         work->windows = 1;
         return calibrate_open(work, STAGE_FIT);
     }

@@ -78,6 +78,23 @@ def test_a_calibration_becomes_a_revision_of_a_material():
         assert newest["contact_time_deviation"] == answer["parameters"][1]["standard_error"]
 
 
+def test_a_motion_that_cannot_be_trusted_at_all_ends():
+    """Steps so long that their error is as large as the motion from its beginning: the search ends, and determines nothing."""
+    scene = {"structure": {"mass": 1.35, "stiffness": 865, "damping_ratio": 0.01}, "duration": 0.0216853, "sample_rate": 66.65,
+             "dampers": [{"mass": 0.1, "clearance": 0.001, "buffer": {"restitution": 0.5, "contact_time": 0.005}}],
+             "excitation": {"kind": "sine", "amplitude": 30, "frequency": 742.9}, "accuracy": {"solver": "rk4"},
+             "output": {"channels": [], "psd": None},
+             "study": {"kind": "calibrate", "starts": 1,
+                       "parameters": [{"pointer": "/dampers/0/clearance", "from": 1e-4, "to": 0.06}],
+                       "measured": [{"channel": "displacement", "interval": 0.0004252,
+                                     "samples": [0.02 * (-1) ** i * (i % 7) / 7 for i in range(50)]}]}}
+    with program.daemon() as daemon:
+        job = daemon.request("POST", "/v1/jobs", json=scene, headers={"Prefer": "wait=20"}).json()
+        assert job["status"] == "successful", job
+        answer = daemon.get(f"/v1/results/{job['result']}/calibration.json").json()
+        assert not answer["parameters"][0]["identifiable"] and answer["runs"] < 3000, answer
+
+
 def test_the_bytes_are_those_of_one_thread():
     """The command, on one thread, gives the document of a daemon with three workers."""
     scene = program.scene("calibrate_free_sponge")
