@@ -273,9 +273,10 @@ static double cost_exact_steps(const Simulation *simulation, const StructureRate
         const double sample = has_blocks ? (m == 0 ? SAMPLE : SAMPLE_NEAR_STOPS)
                                          : (m == 0 ? LONG_FLIGHT * flight : LONG_SAMPLE);
         const double stiff = held > 0 ? work->radians / held : 0; // radians of a sample in contact
-        const double pressed = stiff < 1             ? 0
-                               : stiff < FEW_RADIANS ? 2 * PIECE
-                                                     : HELD_SAMPLE * (1 + HELD_RADIAN * fast);
+        const double pressed = form == CONTACT_IMPULSIVE ? HELD_SAMPLE
+                               : stiff < 1               ? 0
+                               : stiff < FEW_RADIANS     ? 2 * PIECE
+                                                         : HELD_SAMPLE * (1 + HELD_RADIAN * fast);
         return samples * sample + held * pressed + (m > 0 || has_blocks ? PIECE : arc) * arcs +
                IMPACT * work->impacts;
     }
