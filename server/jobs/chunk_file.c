@@ -152,10 +152,10 @@ static Status file_get(const char *path, Bytes *bytes, Problem *problem) {
             bytes_put(bytes, block, (size_t)count);
     const Status status = count == 0 ? STATUS_OK : file_fault(problem, path, "read");
     (void)close(file);
-    if (status == STATUS_OK && bytes->is_failed)
-        return problem_set(problem, bytes->is_over ? STATUS_INVALID : STATUS_NO_MEMORY,
-                           "%.300s is too large", path);
-    return status;
+    if (status != STATUS_OK || !bytes->is_failed)
+        return status;
+    return bytes->is_over ? problem_set(problem, STATUS_INVALID, "%.300s is too large", path)
+                          : problem_set(problem, STATUS_NO_MEMORY, "no memory for %.300s", path);
 }
 
 static void path_remove(const char *path, int depth) {
