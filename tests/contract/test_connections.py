@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Connections that bring nothing: chunk headers that never fit, and idle clients where few files may be open; what is listened on."""
 
+import contextlib
 import os
 import re
 import resource
 import shutil
 import socket
+import ssl
 import subprocess
 import sys
 import tempfile
@@ -43,6 +45,27 @@ def test_a_chunk_header_that_never_fits_is_closed():
         time.sleep(4)
         assert program.cpu_of(daemon.process.pid) - before < 0.4, program.cpu_of(daemon.process.pid) - before
         assert daemon.get("/version").status == 200
+
+
+def test_a_chunk_header_that_never_fits_is_closed_under_tls():
+    """The same where the library holds bytes that it has deciphered and not read."""
+    if shutil.which("openssl") is None:
+        raise program.Skipped("openssl is not installed")
+    with tempfile.TemporaryDirectory() as folder:
+        cert, key = (os.path.join(folder, name) for name in ("cert.pem", "key.pem"))
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost",
+                        "-keyout", key, "-out", cert], check=True, capture_output=True)
+        os.chmod(key, 0o600)
+        context = ssl.create_default_context(cafile=cert)
+        with program.daemon("--tls-cert", cert, "--tls-key", key, data=folder) as daemon:
+            for _ in range(5):
+                with context.wrap_socket(connect(daemon), server_hostname="localhost") as client:
+                    client.sendall(HEAD)
+                    client.sendall(b"1;" + 16382 * b"a")  # one record
+                    began = time.monotonic()
+                    with contextlib.suppress(OSError):
+                        assert client.recv(1000) == b"", "an answer"
+                    assert time.monotonic() - began < 15, time.monotonic() - began
 
 
 def test_a_slow_chunked_body_is_read():
