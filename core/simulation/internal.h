@@ -67,7 +67,7 @@ Status scene_warnings_of_result(const Scene *scene, const DerivedList *derived, 
 // ignored.
 Status plan_scene(const Simulation *simulation, PlanReport *report, Problem *problem);
 Cost cost_scene(const Simulation *simulation);
-double cost_step(const Simulation *simulation); // steps for one that the solver counts
+double cost_step(const Simulation *simulation);       // steps for one that the solver counts
 double cost_truncation(const Simulation *simulation); // steps to predict the error of fewer modes
 double cost_spectra(const SpectrumRequest *psd, size_t samples); // predicted steps
 

@@ -135,10 +135,10 @@ void outcome_unref(Outcome *outcome);
 size_t outcome_bytes(const Outcome *outcome);   // memory in use, for caches
 bool outcome_has_force(const Outcome *outcome); // whether its contacts have a force
 
-// The motion of a completed simulation with a sine base over its cycles, by the exact solver whatever
-// the scene's solver is. `from` as in cycle_flow_new, of a simulation with as many storeys and
-// dampers. STATUS_INVALID, with a fault, where the base has no sine. `limits` and `progress` may be
-// NULL.
+// The motion of a completed simulation with a sine base over its cycles, by the exact solver
+// whatever the scene's solver is. `from` as in cycle_flow_new, of a simulation with as many storeys
+// and dampers. STATUS_INVALID, with a fault, where the base has no sine. `limits` and `progress`
+// may be NULL.
 struct CycleFlow;
 Status simulation_cycle_flow(const Simulation *simulation, const SimulationLimits *limits,
                              const Progress *progress, const struct CycleFlow *from,

@@ -623,12 +623,13 @@ static Status curve_continue_all(CurveWork *work) {
 static Status curve_warn(CurveWork *work) {
     StudyRuns *made = &work->answer->made;
     if (work->unsettled_count > 0)
-        TRY(warnings_add(&made->warnings, "/study/settle_cycles",
-                         "settle_cycles may be too few at %zu of the points, with index %s%s: near the "
-                         "motion without a period is an orbit that is stable or weakly unstable. In "
-                         "resonance of an undamped structure no number is enough",
-                         work->unsettled_count, work->unsettled,
-                         work->unsettled_count > CURVE_NAMED ? " and more" : ""));
+        TRY(warnings_add(
+            &made->warnings, "/study/settle_cycles",
+            "settle_cycles may be too few at %zu of the points, with index %s%s: near the "
+            "motion without a period is an orbit that is stable or weakly unstable. In "
+            "resonance of an undamped structure no number is enough",
+            work->unsettled_count, work->unsettled,
+            work->unsettled_count > CURVE_NAMED ? " and more" : ""));
     return study_runs_warn(made);
 }
 

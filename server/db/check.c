@@ -88,11 +88,10 @@ Status check_run(Sqlite *database, const DbCheck *check, Problem *problem) {
     if (faults + damaged == 0)
         return STATUS_OK;
     const bool is_unreadable = sqlite_could_not_read(database);
-    return problem_set(problem, STATUS_IO,
-                       "the database %s: %llu faults of the file, %llu damaged rows",
-                       is_unreadable ? "could not be read (Input/output error), try again"
-                                     : "is damaged",
-                       (unsigned long long)faults, (unsigned long long)damaged);
+    return problem_set(
+        problem, STATUS_IO, "the database %s: %llu faults of the file, %llu damaged rows",
+        is_unreadable ? "could not be read (Input/output error), try again" : "is damaged",
+        (unsigned long long)faults, (unsigned long long)damaged);
 }
 
 Status check_open(const char *path, Sqlite **source, Problem *problem) {

@@ -127,11 +127,10 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
             "%s is damaged, or no database of SQLite (%s): put a copy of it back, or "
             "move it away, with the files next to it, to start with a new database",
             path, message);
-    return problem_set(problem, status, "%s failed: %s%s%s%s%s%s", doing, message,
-                       is_of_system && cause != 0 ? " (" : "",
-                       is_of_system && cause != 0 ? strerror(cause) : "",
-                       is_of_system && cause != 0 ? ")" : "", has_path ? ", in " : "",
-                       has_path ? path : "");
+    return problem_set(
+        problem, status, "%s failed: %s%s%s%s%s%s", doing, message,
+        is_of_system && cause != 0 ? " (" : "", is_of_system && cause != 0 ? strerror(cause) : "",
+        is_of_system && cause != 0 ? ")" : "", has_path ? ", in " : "", has_path ? path : "");
 }
 
 Status sqlite_execute(Sqlite *database, const char *sql, Problem *problem) {

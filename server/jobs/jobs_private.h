@@ -278,8 +278,8 @@ void commit_retry_cancels(JobManager *manager);
 void task_end(Task *task);
 void jobs_call_waiting(JobManager *manager); // all that wait try again
 
-// cluster.c. Makes Slurm the executor of long studies, as the settings say. What runs there when the
-// manager is closed continues, and is taken up after the next start.
+// cluster.c. Makes Slurm the executor of long studies, as the settings say. What runs there when
+// the manager is closed continues, and is taken up after the next start.
 Status cluster_open(JobManager *manager, Problem *problem);
 
 // resolve.c. Of a prepared request: drops the samples of its records for as long as it waits, and

@@ -1,4 +1,5 @@
-// LD_PRELOAD library for fault injection: fails the N-th allocation or file call below one folder, as a mapped control file says.
+// LD_PRELOAD library for fault injection: fails the N-th allocation or file call below one folder,
+// as a mapped control file says.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -35,12 +36,12 @@ enum { MAX_FILES = 4096, MAX_STACKS = 1 << 16 };
 
 // The control file; tests/faults/control.py writes it. Nothing here allocates.
 typedef struct {
-    _Atomic uint64_t n;      // the call that fails, from 1 on; 0: none, they are only counted
-    _Atomic uint64_t count;  // calls since `calls` was set
-    _Atomic uint64_t failed; // calls of these that failed
-    _Atomic uint32_t calls;  // a bit for each kind that is counted; 0: off
+    _Atomic uint64_t n;            // the call that fails, from 1 on; 0: none, they are only counted
+    _Atomic uint64_t count;        // calls since `calls` was set
+    _Atomic uint64_t failed;       // calls of these that failed
+    _Atomic uint32_t calls;        // a bit for each kind that is counted; 0: off
     _Atomic uint32_t is_permanent; // all calls from the n-th on fail
-    _Atomic int32_t error;   // errno of a failing file call; 0: it reads or writes half
+    _Atomic int32_t error;         // errno of a failing file call; 0: it reads or writes half
     _Atomic uint32_t lists_stacks; // allocations add their call stack to `stacks`
     _Atomic uint64_t stack; // not 0: allocations are counted from the first with this call stack on
     _Atomic uint64_t stacks[MAX_STACKS]; // hash table; 0: a free place
@@ -51,12 +52,12 @@ static char folder[PATH_MAX];
 static size_t folder_length;
 static _Atomic bool is_inside[MAX_FILES]; // by descriptor
 
-// Code of libraries that abort or crash when an allocation of theirs fails, by themselves: these are left out.
-static const char *const fragile[] = {"libfftw3", "libsundials", "libnlopt", "liblapack", "libblas", "libopenblas", "libtasn1"};
+// Code of libraries that abort or crash when an allocation of theirs fails, by themselves: these
+// are left out.
+static const char *const fragile[] = {"libfftw3", "libsundials", "libnlopt", "liblapack",
+                                      "libblas",  "libopenblas", "libtasn1"};
 enum { FRAGILE = sizeof fragile / sizeof *fragile, MAX_RANGES = 64 };
-static struct {
-    uintptr_t from, to;
-} ranges[MAX_RANGES];
+static struct { uintptr_t from, to; } ranges[MAX_RANGES];
 static size_t range_count;
 
 // The allocator below: the address sanitizer's, if the program has it.
@@ -69,11 +70,11 @@ extern void *__libc_calloc(size_t, size_t);
 extern void *__libc_realloc(void *, size_t);
 extern void *__libc_memalign(size_t, size_t);
 
-static int ranges_add(struct dl_phdr_info *library, size_t size, void *unused)
-{
+static int ranges_add(struct dl_phdr_info *library, size_t size, void *unused) {
     (void)size, (void)unused;
     for (size_t i = 0; i < FRAGILE; i++)
-        for (size_t k = 0; strstr(library->dlpi_name, fragile[i]) != NULL && k < library->dlpi_phnum; k++) {
+        for (size_t k = 0;
+             strstr(library->dlpi_name, fragile[i]) != NULL && k < library->dlpi_phnum; k++) {
             const ElfW(Phdr) *part = &library->dlpi_phdr[k];
             if (part->p_type != PT_LOAD || (part->p_flags & PF_X) == 0 || range_count == MAX_RANGES)
                 continue;
@@ -84,8 +85,7 @@ static int ranges_add(struct dl_phdr_info *library, size_t size, void *unused)
     return 0;
 }
 
-__attribute__((constructor)) static void interpose_start(void)
-{
+__attribute__((constructor)) static void interpose_start(void) {
     const char *file = getenv("IMPACTD_FAULTS"), *below = getenv("IMPACTD_FAULTS_BELOW");
     if (file == NULL || below == NULL || strlen(below) >= sizeof folder)
         return;
@@ -100,41 +100,38 @@ __attribute__((constructor)) static void interpose_start(void)
     control = map == MAP_FAILED ? NULL : map;
 }
 
-static uint64_t hash_add(uint64_t hash, uint64_t number)
-{
+static uint64_t hash_add(uint64_t hash, uint64_t number) {
     return (hash ^ number) * 0x100000001B3 ^ hash >> 29;
 }
 
 // An address counts from the start of its library, so that it is the same in each run.
-static _Unwind_Reason_Code stack_add(struct _Unwind_Context *frame, void *hash)
-{
+static _Unwind_Reason_Code stack_add(struct _Unwind_Context *frame, void *hash) {
     uint64_t address = _Unwind_GetIP(frame);
     struct dl_find_object library;
     if (_dl_find_object((void *)address, &library) == 0) {
         const struct link_map *map = library.dlfo_link_map;
-        *(uint64_t *)hash = hash_add(hash_add(*(uint64_t *)hash, address - map->l_addr), (uintptr_t)map->l_ld - map->l_addr);
+        *(uint64_t *)hash = hash_add(hash_add(*(uint64_t *)hash, address - map->l_addr),
+                                     (uintptr_t)map->l_ld - map->l_addr);
     }
     return _URC_NO_REASON;
 }
 
-static uint64_t stack_hash(void)
-{
+static uint64_t stack_hash(void) {
     uint64_t hash = 0xCBF29CE484222325;
     (void)_Unwind_Backtrace(stack_add, &hash);
     return hash != 0 ? hash : 1;
 }
 
-static void stacks_add(uint64_t stack)
-{
+static void stacks_add(uint64_t stack) {
     for (uint64_t i = stack, tried = 0; tried < MAX_STACKS; i++, tried++) {
         uint64_t there = 0;
-        if (atomic_compare_exchange_strong(&control->stacks[i % MAX_STACKS], &there, stack) || there == stack)
+        if (atomic_compare_exchange_strong(&control->stacks[i % MAX_STACKS], &there, stack) ||
+            there == stack)
             return;
     }
 }
 
-static bool call_fails(unsigned call)
-{
+static bool call_fails(unsigned call) {
     if (control == NULL || (atomic_load(&control->calls) & 1u << call) == 0)
         return false;
     uint64_t awaited = atomic_load(&control->count) == 0 ? atomic_load(&control->stack) : 0;
@@ -156,8 +153,7 @@ static bool call_fails(unsigned call)
 // The address sanitizer asks for each thread's stack and ends the process where that fails.
 static __thread bool is_of_sanitizer __attribute__((tls_model("initial-exec")));
 
-static bool allocation_fails(const void *caller)
-{
+static bool allocation_fails(const void *caller) {
     if (is_of_sanitizer)
         return false;
     for (size_t i = 0; i < range_count; i++)
@@ -169,61 +165,56 @@ static bool allocation_fails(const void *caller)
     return true;
 }
 
-void *malloc(size_t size)
-{
+void *malloc(size_t size) {
     if (allocation_fails(__builtin_return_address(0)))
         return NULL;
     return __interceptor_malloc != NULL ? __interceptor_malloc(size) : __libc_malloc(size);
 }
 
-void *calloc(size_t count, size_t size)
-{
+void *calloc(size_t count, size_t size) {
     if (allocation_fails(__builtin_return_address(0)))
         return NULL;
-    return __interceptor_calloc != NULL ? __interceptor_calloc(count, size) : __libc_calloc(count, size);
+    return __interceptor_calloc != NULL ? __interceptor_calloc(count, size)
+                                        : __libc_calloc(count, size);
 }
 
-void *realloc(void *old, size_t size)
-{
+void *realloc(void *old, size_t size) {
     if (size > 0 && allocation_fails(__builtin_return_address(0)))
         return NULL;
-    return __interceptor_realloc != NULL ? __interceptor_realloc(old, size) : __libc_realloc(old, size);
+    return __interceptor_realloc != NULL ? __interceptor_realloc(old, size)
+                                         : __libc_realloc(old, size);
 }
 
-static void *aligned(size_t alignment, size_t size)
-{
+static void *aligned(size_t alignment, size_t size) {
     void *memory = NULL;
     if (__interceptor_posix_memalign == NULL)
         return __libc_memalign(alignment, size);
     return __interceptor_posix_memalign(&memory, alignment, size) == 0 ? memory : NULL;
 }
 
-int posix_memalign(void **memory, size_t alignment, size_t size)
-{
+int posix_memalign(void **memory, size_t alignment, size_t size) {
     if (allocation_fails(__builtin_return_address(0)))
         return ENOMEM;
     *memory = aligned(alignment, size);
     return *memory == NULL ? ENOMEM : 0;
 }
 
-#define ALIGNED(name) \
-    void *name(size_t alignment, size_t size) \
-    { \
-        if (allocation_fails(__builtin_return_address(0))) \
-            return NULL; \
-        return aligned(alignment, size); \
+#define ALIGNED(name)                                                                              \
+    void *name(size_t alignment, size_t size) {                                                    \
+        if (allocation_fails(__builtin_return_address(0)))                                         \
+            return NULL;                                                                           \
+        return aligned(alignment, size);                                                           \
     }
 ALIGNED(memalign)
 ALIGNED(aligned_alloc)
 
 // The next definition of a function: the sanitizer's or the library's.
-#define NEXT(name) \
-    static __typeof__(name) *next; \
-    if (next == NULL) \
-        *(void **)&next = dlsym(RTLD_NEXT, #name)
+#define NEXT(name)                                                                                 \
+    static __typeof__(name) *next;                                                                 \
+    if (next == NULL)                                                                              \
+    *(void **)&next = dlsym(RTLD_NEXT, #name)
 
-int pthread_getattr_np(pthread_t thread, pthread_attr_t *attributes)
-{
+int pthread_getattr_np(pthread_t thread, pthread_attr_t *attributes) {
     NEXT(pthread_getattr_np);
     is_of_sanitizer = true;
     int code = next(thread, attributes);
@@ -231,88 +222,78 @@ int pthread_getattr_np(pthread_t thread, pthread_attr_t *attributes)
     return code;
 }
 
-static bool file_fails(unsigned call)
-{
+static bool file_fails(unsigned call) {
     if (!call_fails(call))
         return false;
     errno = atomic_load(&control->error);
     return true;
 }
 
-static bool path_is_inside(int at, const char *path)
-{
+static bool path_is_inside(int at, const char *path) {
     if (path[0] != '/')
         return at >= 0 && at < MAX_FILES && is_inside[at];
     return folder_length > 0 && strncmp(path, folder, folder_length) == 0;
 }
 
-static bool fd_is_inside(int fd)
-{
+static bool fd_is_inside(int fd) {
     return fd >= 0 && fd < MAX_FILES && is_inside[fd];
 }
 
-static int opened(int fd, bool inside)
-{
+static int opened(int fd, bool inside) {
     if (fd >= 0 && fd < MAX_FILES)
         is_inside[fd] = inside;
     return fd;
 }
 
-#define OPEN(name, at, values, ...) \
-    int name(__VA_ARGS__, ...) \
-    { \
-        NEXT(name); \
-        va_list more; \
-        va_start(more, flags); \
-        mode_t mode = flags & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY)) ? va_arg(more, mode_t) : 0; \
-        va_end(more); \
-        bool inside = path_is_inside(at, path); \
-        return inside && file_fails(CALL_OPEN) ? -1 : opened(next values, inside); \
+#define OPEN(name, at, values, ...)                                                                \
+    int name(__VA_ARGS__, ...) {                                                                   \
+        NEXT(name);                                                                                \
+        va_list more;                                                                              \
+        va_start(more, flags);                                                                     \
+        mode_t mode = flags & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY)) ? va_arg(more, mode_t) : 0;   \
+        va_end(more);                                                                              \
+        bool inside = path_is_inside(at, path);                                                    \
+        return inside && file_fails(CALL_OPEN) ? -1 : opened(next values, inside);                 \
     }
 OPEN(open, -1, (path, flags, mode), const char *path, int flags)
 OPEN(open64, -1, (path, flags, mode), const char *path, int flags)
 OPEN(openat, at, (at, path, flags, mode), int at, const char *path, int flags)
 OPEN(openat64, at, (at, path, flags, mode), int at, const char *path, int flags)
 
-int mkstemp(char *path)
-{
+int mkstemp(char *path) {
     NEXT(mkstemp);
     bool inside = path_is_inside(-1, path);
     return inside && file_fails(CALL_OPEN) ? -1 : opened(next(path), inside);
 }
 
-int close(int fd)
-{
+int close(int fd) {
     NEXT(close);
     opened(fd, false);
     return next(fd);
 }
 
 // A failing call of `size` bytes: -1 with errno, or half of them.
-#define TRANSFER(fd, call, size, half) \
-    if (fd_is_inside(fd) && file_fails(call)) \
-        return errno != 0 || (size) < 2 ? -1 : (half)
+#define TRANSFER(fd, call, size, half)                                                             \
+    if (fd_is_inside(fd) && file_fails(call))                                                      \
+    return errno != 0 || (size) < 2 ? -1 : (half)
 
-ssize_t read(int fd, void *bytes, size_t size)
-{
+ssize_t read(int fd, void *bytes, size_t size) {
     NEXT(read);
     TRANSFER(fd, CALL_READ, size, next(fd, bytes, size / 2));
     return next(fd, bytes, size);
 }
 
-ssize_t write(int fd, const void *bytes, size_t size)
-{
+ssize_t write(int fd, const void *bytes, size_t size) {
     NEXT(write);
     TRANSFER(fd, CALL_WRITE, size, next(fd, bytes, size / 2));
     return next(fd, bytes, size);
 }
 
-#define AT_OFFSET(name, constant, call) \
-    ssize_t name(int fd, constant void *bytes, size_t size, off_t offset) \
-    { \
-        NEXT(name); \
-        TRANSFER(fd, call, size, next(fd, bytes, size / 2, offset)); \
-        return next(fd, bytes, size, offset); \
+#define AT_OFFSET(name, constant, call)                                                            \
+    ssize_t name(int fd, constant void *bytes, size_t size, off_t offset) {                        \
+        NEXT(name);                                                                                \
+        TRANSFER(fd, call, size, next(fd, bytes, size / 2, offset));                               \
+        return next(fd, bytes, size, offset);                                                      \
     }
 AT_OFFSET(pread, , CALL_READ)
 AT_OFFSET(pread64, , CALL_READ)
@@ -320,11 +301,12 @@ AT_OFFSET(pwrite, const, CALL_WRITE)
 AT_OFFSET(pwrite64, const, CALL_WRITE)
 
 // Calls of a descriptor that have no half: a short count leaves them as they are.
-#define OF_FD(name, call, arguments, values) \
-    int name arguments \
-    { \
-        NEXT(name); \
-        return fd_is_inside(fd) && atomic_load(&control->error) != 0 && file_fails(call) ? -1 : next values; \
+#define OF_FD(name, call, arguments, values)                                                       \
+    int name arguments {                                                                           \
+        NEXT(name);                                                                                \
+        return fd_is_inside(fd) && atomic_load(&control->error) != 0 && file_fails(call)           \
+                   ? -1                                                                            \
+                   : next values;                                                                  \
     }
 OF_FD(fsync, CALL_SYNC, (int fd), (fd))
 OF_FD(fdatasync, CALL_SYNC, (int fd), (fd))
@@ -333,29 +315,27 @@ OF_FD(ftruncate64, CALL_TRUNCATE, (int fd, off_t size), (fd, size))
 OF_FD(fallocate, CALL_RESERVE, (int fd, int mode, off_t from, off_t size), (fd, mode, from, size))
 OF_FD(fallocate64, CALL_RESERVE, (int fd, int mode, off_t from, off_t size), (fd, mode, from, size))
 
-#define MAP(name) \
-    void *name(void *at, size_t size, int protection, int flags, int fd, off_t offset) \
-    { \
-        NEXT(name); \
-        return fd_is_inside(fd) && file_fails(CALL_MAP) ? MAP_FAILED : next(at, size, protection, flags, fd, offset); \
+#define MAP(name)                                                                                  \
+    void *name(void *at, size_t size, int protection, int flags, int fd, off_t offset) {           \
+        NEXT(name);                                                                                \
+        return fd_is_inside(fd) && file_fails(CALL_MAP)                                            \
+                   ? MAP_FAILED                                                                    \
+                   : next(at, size, protection, flags, fd, offset);                                \
     }
 MAP(mmap)
 MAP(mmap64)
 
-int rename(const char *from, const char *to)
-{
+int rename(const char *from, const char *to) {
     NEXT(rename);
     return path_is_inside(-1, to) && file_fails(CALL_RENAME) ? -1 : next(from, to);
 }
 
-int unlink(const char *path)
-{
+int unlink(const char *path) {
     NEXT(unlink);
     return path_is_inside(-1, path) && file_fails(CALL_UNLINK) ? -1 : next(path);
 }
 
-int unlinkat(int at, const char *path, int flags)
-{
+int unlinkat(int at, const char *path, int flags) {
     NEXT(unlinkat);
     return path_is_inside(at, path) && file_fails(CALL_UNLINK) ? -1 : next(at, path, flags);
 }

@@ -1,7 +1,8 @@
-// LD_PRELOAD library that runs one thread of a program at a time: the one of the highest priority, and priorities are drawn
-// from a seed in a mapped control file, anew at random points. A thread gives up its turn while it waits for a mutex, a
-// condition, a descriptor or the disk; one that computes for long without any call loses it to the next in line. Now and then
-// one is stopped for some milliseconds, so that others answer whole requests meanwhile.
+// LD_PRELOAD library that runs one thread of a program at a time: the one of the highest priority,
+// and priorities are drawn from a seed in a mapped control file, anew at random points. A thread
+// gives up its turn while it waits for a mutex, a condition, a descriptor or the disk; one that
+// computes for long without any call loses it to the next in line. Now and then one is stopped for
+// some milliseconds, so that others answer whole requests meanwhile.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -32,7 +33,8 @@ enum {
 // The control file; tests/threads/schedules.py writes the seed and reads the counts.
 typedef struct {
     _Atomic uint64_t seed;     // of the schedule; another one begins another schedule
-    _Atomic uint64_t points;   // calls at which another thread could have been chosen, of this schedule as all that follow
+    _Atomic uint64_t points;   // calls at which another thread could have been chosen, of this
+                               // schedule as all that follow
     _Atomic uint64_t switches; // at which another one was chosen
     _Atomic uint64_t taken;    // turns taken from threads that made no call
     _Atomic uint64_t digest;   // of the order of threads
@@ -64,15 +66,14 @@ static struct {
     int (*cond_broadcast)(pthread_cond_t *);
 } next;
 
-// The C library of some machines has two versions of the functions of conditions, and the older one may be found first.
-static void *next_find(const char *name)
-{
+// The C library of some machines has two versions of the functions of conditions, and the older one
+// may be found first.
+static void *next_find(const char *name) {
     void *found = dlvsym(RTLD_NEXT, name, "GLIBC_2.3.2");
     return found != NULL ? found : dlsym(RTLD_NEXT, name);
 }
 
-static void next_find_all(void)
-{
+static void next_find_all(void) {
     if (next.cond_broadcast != NULL)
         return;
     *(void **)&next.mutex_lock = dlsym(RTLD_NEXT, "pthread_mutex_lock");
@@ -84,11 +85,11 @@ static void next_find_all(void)
     *(void **)&next.cond_broadcast = next_find("pthread_cond_broadcast");
 }
 
-// Where the program's own code is. The locks of its libraries are no points: SQLite has some hundred for each query.
+// Where the program's own code is. The locks of its libraries are no points: SQLite has some
+// hundred for each query.
 static uintptr_t code_begin, code_end;
 
-static int code_find(struct dl_phdr_info *program, size_t size, void *unused)
-{
+static int code_find(struct dl_phdr_info *program, size_t size, void *unused) {
     (void)size, (void)unused;
     for (size_t i = 0; i < program->dlpi_phnum; i++) {
         const ElfW(Phdr) *part = &program->dlpi_phdr[i];
@@ -100,13 +101,11 @@ static int code_find(struct dl_phdr_info *program, size_t size, void *unused)
     return 1; // the program itself is the first
 }
 
-static bool is_own(const void *caller)
-{
+static bool is_own(const void *caller) {
     return (uintptr_t)caller >= code_begin && (uintptr_t)caller < code_end;
 }
 
-__attribute__((constructor)) static void schedule_start(void)
-{
+__attribute__((constructor)) static void schedule_start(void) {
     next_find_all();
     (void)dl_iterate_phdr(code_find, NULL);
     const char *file = getenv("IMPACTD_SCHEDULE");
@@ -119,8 +118,7 @@ __attribute__((constructor)) static void schedule_start(void)
 }
 
 // splitmix64
-static uint64_t draw(void)
-{
+static uint64_t draw(void) {
     uint64_t z = chance += 0x9e3779b97f4a7c15u;
     z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
     z = (z ^ z >> 27) * 0x94d049bb133111ebu;
@@ -128,8 +126,7 @@ static uint64_t draw(void)
 }
 
 // The slot of the calling thread. NULL if there are too many: it runs freely.
-static Thread *thread_self(void)
-{
+static Thread *thread_self(void) {
     if (self != NULL)
         return self;
     for (size_t i = 0; i < MAX_THREADS; i++)
@@ -150,8 +147,7 @@ static Thread *thread_self(void)
     return NULL;
 }
 
-static void seed_read(void)
-{
+static void seed_read(void) {
     const uint64_t now = atomic_load(&control->seed);
     if (now == seed)
         return;
@@ -162,28 +158,27 @@ static void seed_read(void)
         threads[i].priority = draw();
 }
 
-static Thread *thread_first_ready(void)
-{
+static Thread *thread_first_ready(void) {
     Thread *first = NULL;
     for (size_t i = 0; i < thread_count; i++)
-        if (threads[i].state == THREAD_READY && (first == NULL || threads[i].priority > first->priority))
+        if (threads[i].state == THREAD_READY &&
+            (first == NULL || threads[i].priority > first->priority))
             first = &threads[i];
     return first;
 }
 
-static void turn_give(Thread *thread)
-{
+static void turn_give(Thread *thread) {
     running = thread;
     if (thread == NULL)
         return;
     atomic_fetch_add(&control->switches, 1);
-    atomic_store(&control->digest, (atomic_load(&control->digest) ^ (uint64_t)(thread - threads)) * 0x100000001b3u);
+    atomic_store(&control->digest,
+                 (atomic_load(&control->digest) ^ (uint64_t)(thread - threads)) * 0x100000001b3u);
     next.cond_signal(&thread->turn);
 }
 
 // Until the calling thread has its turn, or has waited for one that makes no call.
-static void turn_wait(Thread *thread)
-{
+static void turn_wait(Thread *thread) {
     struct timespec end;
     clock_gettime(CLOCK_MONOTONIC, &end);
     end.tv_nsec += PATIENCE_MS * 1000000L;
@@ -201,8 +196,7 @@ static void turn_wait(Thread *thread)
 }
 
 // With the lock held, which is released meanwhile.
-static void thread_stop(Thread *thread)
-{
+static void thread_stop(Thread *thread) {
     const struct timespec time = {.tv_nsec = (long)(draw() % STOP_MS + 1) * 1000000L};
     thread->state = THREAD_OUTSIDE;
     if (running == thread)
@@ -214,8 +208,7 @@ static void thread_stop(Thread *thread)
 }
 
 // A call at which another thread may be chosen. errno stays.
-static void point(void)
-{
+static void point(void) {
     const int error = errno;
     if (control == NULL)
         return;
@@ -239,8 +232,7 @@ static void point(void)
 }
 
 // The calling thread is going to wait for something else than its turn.
-static void leave(ThreadState state)
-{
+static void leave(ThreadState state) {
     if (control == NULL)
         return;
     next.mutex_lock(&lock);
@@ -253,8 +245,7 @@ static void leave(ThreadState state)
     next.mutex_unlock(&lock);
 }
 
-static void enter(void)
-{
+static void enter(void) {
     const int error = errno;
     if (control == NULL)
         return;
@@ -266,8 +257,7 @@ static void enter(void)
     errno = error;
 }
 
-int pthread_mutex_lock(pthread_mutex_t *mutex)
-{
+int pthread_mutex_lock(pthread_mutex_t *mutex) {
     next_find_all();
     if (is_own(__builtin_return_address(0)))
         point();
@@ -280,8 +270,7 @@ int pthread_mutex_lock(pthread_mutex_t *mutex)
     return code;
 }
 
-int pthread_mutex_unlock(pthread_mutex_t *mutex)
-{
+int pthread_mutex_unlock(pthread_mutex_t *mutex) {
     next_find_all();
     const int code = next.mutex_unlock(mutex);
     if (is_own(__builtin_return_address(0)))
@@ -289,8 +278,7 @@ int pthread_mutex_unlock(pthread_mutex_t *mutex)
     return code;
 }
 
-int pthread_cond_wait(pthread_cond_t *condition, pthread_mutex_t *mutex)
-{
+int pthread_cond_wait(pthread_cond_t *condition, pthread_mutex_t *mutex) {
     next_find_all();
     leave(THREAD_OUTSIDE);
     const int code = next.cond_wait(condition, mutex);
@@ -298,8 +286,8 @@ int pthread_cond_wait(pthread_cond_t *condition, pthread_mutex_t *mutex)
     return code;
 }
 
-int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex, const struct timespec *end)
-{
+int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex,
+                           const struct timespec *end) {
     next_find_all();
     leave(THREAD_OUTSIDE);
     const int code = next.cond_timedwait(condition, mutex, end);
@@ -307,15 +295,13 @@ int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex, co
     return code;
 }
 
-int pthread_cond_signal(pthread_cond_t *condition)
-{
+int pthread_cond_signal(pthread_cond_t *condition) {
     next_find_all();
     point();
     return next.cond_signal(condition);
 }
 
-int pthread_cond_broadcast(pthread_cond_t *condition)
-{
+int pthread_cond_broadcast(pthread_cond_t *condition) {
     next_find_all();
     point();
     return next.cond_broadcast(condition);
@@ -326,8 +312,7 @@ typedef struct {
     void *context;
 } Start;
 
-static void *thread_main(void *context)
-{
+static void *thread_main(void *context) {
     const Start start = *(Start *)context;
     free(context);
     point();
@@ -336,13 +321,13 @@ static void *thread_main(void *context)
     return result;
 }
 
-#define NEXT(name) \
-    static __typeof__(name) *follows; \
-    if (follows == NULL) \
-        *(void **)&follows = dlsym(RTLD_NEXT, #name)
+#define NEXT(name)                                                                                 \
+    static __typeof__(name) *follows;                                                              \
+    if (follows == NULL)                                                                           \
+    *(void **)&follows = dlsym(RTLD_NEXT, #name)
 
-int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *), void *context)
-{
+int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
+                   void *context) {
     NEXT(pthread_create);
     Start *start = malloc(sizeof *start);
     if (start == NULL)
@@ -356,18 +341,18 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
 }
 
 // Calls that wait: others have their turns meanwhile.
-#define WAITS(type, name, arguments, values) \
-    type name arguments \
-    { \
-        NEXT(name); \
-        leave(THREAD_OUTSIDE); \
-        const type result = follows values; \
-        enter(); \
-        return result; \
+#define WAITS(type, name, arguments, values)                                                       \
+    type name arguments {                                                                          \
+        NEXT(name);                                                                                \
+        leave(THREAD_OUTSIDE);                                                                     \
+        const type result = follows values;                                                        \
+        enter();                                                                                   \
+        return result;                                                                             \
     }
 WAITS(int, pthread_join, (pthread_t thread, void **result_of), (thread, result_of))
-WAITS(int, poll, (struct pollfd *events, nfds_t count, int timeout), (events, count, timeout))
-WAITS(int, epoll_wait, (int fd, struct epoll_event *events, int count, int timeout), (fd, events, count, timeout))
+WAITS(int, poll, (struct pollfd * events, nfds_t count, int timeout), (events, count, timeout))
+WAITS(int, epoll_wait, (int fd, struct epoll_event *events, int count, int timeout),
+      (fd, events, count, timeout))
 WAITS(int, sigwaitinfo, (const sigset_t *signals, siginfo_t *signal), (signals, signal))
 WAITS(int, nanosleep, (const struct timespec *time, struct timespec *rest), (time, rest))
 WAITS(int, usleep, (useconds_t time), (time))
@@ -375,16 +360,16 @@ WAITS(int, fsync, (int fd), (fd))
 WAITS(int, fdatasync, (int fd), (fd))
 
 // Calls that do not wait, and that another thread may notice.
-#define POINT(type, name, arguments, values) \
-    type name arguments \
-    { \
-        NEXT(name); \
-        point(); \
-        return follows values; \
+#define POINT(type, name, arguments, values)                                                       \
+    type name arguments {                                                                          \
+        NEXT(name);                                                                                \
+        point();                                                                                   \
+        return follows values;                                                                     \
     }
 POINT(ssize_t, write, (int fd, const void *bytes, size_t size), (fd, bytes, size))
 POINT(ssize_t, recv, (int fd, void *bytes, size_t size, int flags), (fd, bytes, size, flags))
 POINT(ssize_t, send, (int fd, const void *bytes, size_t size, int flags), (fd, bytes, size, flags))
 POINT(ssize_t, sendmsg, (int fd, const struct msghdr *message, int flags), (fd, message, flags))
 POINT(ssize_t, pread64, (int fd, void *bytes, size_t size, off_t offset), (fd, bytes, size, offset))
-POINT(ssize_t, pwrite64, (int fd, const void *bytes, size_t size, off_t offset), (fd, bytes, size, offset))
+POINT(ssize_t, pwrite64, (int fd, const void *bytes, size_t size, off_t offset),
+      (fd, bytes, size, offset))

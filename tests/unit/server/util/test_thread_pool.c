@@ -16,7 +16,8 @@ TEST(a_thread_that_cannot_be_started_is_named_with_the_reason) {
     ThreadPool *pool;
     assert_int_equal(pthread_getattr_default_np(&before), 0);
     assert_int_equal(pthread_attr_init(&attributes), 0);
-    assert_int_equal(pthread_attr_setstacksize(&attributes, (size_t)1 << 50), 0); // more than any address
+    assert_int_equal(pthread_attr_setstacksize(&attributes, (size_t)1 << 50),
+                     0); // more than any address
     assert_int_equal(pthread_setattr_default_np(&attributes), 0);
     assert_int_equal(thread_start(&thread, nothing, NULL, "a worker", &problem), STATUS_NO_MEMORY);
     assert_string_equal(problem.detail,
