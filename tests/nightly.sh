@@ -149,7 +149,7 @@ part_faults() {
     for kind in allocations EIO ENOSPC short; do sized '--stride 100' '--stride 1' "$python" tests/faults/inject.py --build build "$kind"; done
     # The sanitizer looks for leaks at the end of each server. 600 s
     sized '--stride 200' '--stride 7' "$python" tests/faults/inject.py --build build-debug allocations
-    # Starts, copies and checks: every file call, every call stack of allocations; of their 150,000 allocations each 397th. 4500 s
+    # Starts, copies and checks: every file call, every call stack of allocations; of their 150,000 allocations each 397th. 8000 s
     for kind in EIO ENOSPC short; do sized '--stride 50' '--stride 1' "$python" tests/faults/commands.py --build build "$kind"; done
     for kind in build build-debug; do sized '--stride 200' '--stride 1' "$python" tests/faults/commands.py --build $kind stacks; done
     sized '--stride 5000' '--stride 397' "$python" tests/faults/commands.py --build build allocations
