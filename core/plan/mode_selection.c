@@ -37,9 +37,9 @@ static const double NEGLIGIBLE = ROUNDINGS * DBL_EPSILON;
 
 static const double PI = 3.14159265358979323846;
 static const double SAFETY = 2;
-static const double STEPS_MAX = 2e7;                   // steps of modes: about 40 ms
+static const double STEPS_MAX = 2e7;                   // steps of modes: about 0.1 s
 static const double RADIANS = 0.3;                     // of the fastest motion in a step
-static const double MODE_STEP = 0.07, BASE_STEP = 0.3; // cost of a step, in solver steps
+static const double MODE_STEP = 0.12, BASE_STEP = 1.5; // cost of a step, in solver steps
 
 // All modes in motion. Arrays have a number for each mode.
 typedef struct ModalRun {

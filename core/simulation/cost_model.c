@@ -304,11 +304,12 @@ double cost_truncation(const Simulation *simulation) {
     StructureRates rates;
     if (structure_rates(structure, SIZE_MAX, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // without memory: the run reports it
-    const double own = excitation_kind(excitation)->fastest != NULL
-                           ? excitation_kind(excitation)->fastest(excitation)
-                           : 0;
+    const ExcitationKind *kind = excitation_kind(excitation);
+    double band[2] = {0};
+    if (kind->interval == NULL && kind->band != NULL)
+        kind->band(excitation, band);
     return truncation_cost(scene->duration, scene->sample_rate,
-                           simulation_base_interval(simulation), fmax(own, rates.fastest),
+                           simulation_base_interval(simulation), fmax(band[1], rates.fastest),
                            structure_storeys(structure)) +
            cost_base(simulation, &(double){0});
 }
