@@ -254,6 +254,11 @@ static Status comparison_cost(const void *request, const Simulation *simulation,
     return status;
 }
 
+// Displacement and mean acceleration of the reference and of another run.
+static double comparison_bytes(const Simulation *simulation) {
+    return sizeof(double) * 4 * (double)scene_sample_count(&simulation->scene);
+}
+
 // Its members are the entries after the first.
 typedef struct CompareWork {
     StudyWork work;
@@ -479,6 +484,7 @@ const StudyKind study_compare = {
     .shorten = "ask for fewer models",
     .complete = comparison_complete,
     .cost = comparison_cost,
+    .bytes = comparison_bytes,
     .work_size = sizeof(CompareWork),
     .part_size = sizeof(ComparePart),
     .begin = comparison_begin,

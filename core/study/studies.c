@@ -54,6 +54,12 @@ static Status studies_check_cost(const StudyRequest *request, const SimulationLi
     Cost cost;
     const double max = study_max_steps(request->study, limits);
     TRY(study_request_cost(request, limits, &cost, problem));
+    if (limits->bytes > 0 && cost.bytes > limits->bytes)
+        return problem_add(
+            problem, STATUS_INVALID, "/study",
+            "would take about %.3g MB of memory, at most %.4g MB are allowed: take a "
+            "shorter duration or a lower sample_rate",
+            1e-6 * cost.bytes, 1e-6 * limits->bytes);
     if (cost.steps <= max)
         return STATUS_OK;
     return problem_add(problem, STATUS_INVALID, "/study",
@@ -86,10 +92,10 @@ Status study_request_cost(const StudyRequest *request, const SimulationLimits *l
     *cost = simulation_cost(&request->simulation);
     if (request->study == NULL)
         return STATUS_OK;
+    const StudyKind *kind = study_kind(request->study);
     double steps;
-    TRY(study_result(
-        study_kind(request->study)->cost(request->study, &request->simulation, limits, &steps),
-        problem));
+    TRY(study_result(kind->cost(request->study, &request->simulation, limits, &steps), problem));
+    cost->bytes += kind->bytes != NULL ? kind->bytes(&request->simulation) : 0;
     cost->steps += steps;
     cost->cpu_seconds = cost->steps * SOLVER_STEP;
     return STATUS_OK;

@@ -186,6 +186,8 @@ struct StudyKind {
     // Estimated cost of a completed study in solver steps. STATUS_NO_MEMORY.
     Status (*cost)(const void *study, const Simulation *simulation, const SimulationLimits *limits,
                    double *steps);
+    // Memory that a completed study takes beside a run of its scene. NULL: little.
+    double (*bytes)(const Simulation *simulation);
     size_t work_size, part_size; // of the kind's structs, which begin zeroed
     // Validates, runs what all members need, fills `members` and the first part of the answer. A
     // study without members is made here, on one thread: the functions below are NULL then, but for

@@ -341,6 +341,12 @@ static Status tradeoff_check_values(const Simulation *simulation, const Simulati
                        values, 4 * (double)limits->samples);
 }
 
+// Of the reference and of another run.
+static double tradeoff_bytes(const Simulation *simulation) {
+    const double storeys = (double)structure_storeys(scene_structure(&simulation->scene));
+    return sizeof(double) * 4 * storeys * (double)scene_sample_count(&simulation->scene);
+}
+
 static Status tradeoff_complete(void *request, const Simulation *simulation,
                                 const SimulationLimits *limits, Problem *problem) {
     TradeoffStudy *study = request;
@@ -649,6 +655,7 @@ const StudyKind study_tradeoff = {
     .is_measured = true,
     .complete = tradeoff_complete,
     .cost = tradeoff_cost,
+    .bytes = tradeoff_bytes,
     .work_size = sizeof(TradeoffRun),
     .begin = tradeoff_begin,
     .free = tradeoff_free,

@@ -231,6 +231,12 @@ TEST(what_cannot_be_answered_is_refused) {
     inquiry = study_request_make(0.025, 2, 1000);
     const SimulationLimits limits = {.steps = 1e6};
     assert_refused(&inquiry, &limits, "/study", "s of CPU in all, at most 0.3 s are allowed");
+
+    inquiry = study_request_make(0.025, 2, 1);
+    inquiry.simulation.scene.sample_rate = 1e5; // the reference and one run: 6.4 MB
+    const SimulationLimits room = {.steps = 1e9, .bytes = 12e6};
+    assert_refused(&inquiry, &room, "/study",
+                   "MB of memory, at most 12 MB are allowed: take a shorter");
 }
 
 TEST(the_usual_error_is_the_metrics) {
