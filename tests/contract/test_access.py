@@ -265,7 +265,7 @@ def climb(daemon, secret):
 # What may be opened outside the data folder: before requests are taken, what programs and libraries are made of; then clock,
 # locale, processor, random numbers, and what /metrics reports of the process.
 SYSTEM = r"/(lib|usr|etc|proc|sys|dev)(/.*)?"
-SERVING = (r"/(etc/localtime|usr/share/(zoneinfo|locale)/.*|usr/lib/(locale|[^/]+/gconv)/.*|sys/devices/system/cpu/online|dev/urandom|"
+SERVING = (r"/(etc/localtime|usr/share/(zoneinfo|locale)/.*|usr/lib/(locale|[^/]+/gconv)/.*|sys/devices/system/cpu/online|proc/stat|dev/urandom|"
            r"proc/self/(statm|fd|stat))")
 WRITES = r"\bO_(WRONLY|RDWR|CREAT|TRUNC)\b|^(unlink|rename|mkdir|rmdir|link|symlink|truncate|chmod|fchmodat|chown|mknod|creat|mount|set\w*xattr)"
 
