@@ -282,7 +282,9 @@ def test_jobs_can_be_waited_for_and_cancelled():
 def test_interrupts_cancel_where_that_was_asked_for():
     """Ctrl-C in run ends the job on the server with cancel_on_interrupt=True."""
     with program.daemon() as daemon:
-        code = ("import impactd, json, sys; lab = impactd.connect(cancel_on_interrupt=True)\n"
+        # A shell lets what it runs in the background ignore Ctrl-C.
+        code = ("import impactd, json, signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+                "lab = impactd.connect(cancel_on_interrupt=True)\n"
                 "print('ready', flush=True); lab.run(json.load(sys.stdin))")
         process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                    env={**os.environ, "PYTHONPATH": os.path.dirname(impactd.__file__), "IMPACTD_SERVER": daemon.url})
