@@ -619,7 +619,7 @@ static Status calibrate_end_window(CalibrateWork *work) {
             return calibrate_return(work);
         // Not 0, which is no limit.
         work->ends[0] = work->limit =
-            fmax(predictable * best->horizon, work->study->measured.at[0].interval);
+            best->horizon > 0 ? predictable * best->horizon : work->study->measured.at[0].interval;
         work->windows = 1;
         return calibrate_open(work, STAGE_FIT);
     }
