@@ -187,6 +187,8 @@ def test_a_controller_that_is_away():
             at.slurm.start_controller()
             # After kill -9 Slurm finds "Duplicate jobid" and drains nodes, which is for administrators to mend.
             until(lambda: at.document()["status"] == "successful" or at.slurm.resume() or time.sleep(1), at.cluster)
+            if how == signal.SIGKILL:  # Slurm may also forget that a task was cancelled
+                until(lambda: not at.slurm.tasks() or at.slurm.call("scancel", f"--name={at.name()}"), at.slurm.tasks)
             at.ends_well()
 
 
