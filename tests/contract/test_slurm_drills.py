@@ -388,7 +388,8 @@ def crash(at):
 def test_tasks_that_are_told_to_end():
     """SIGTERM, as before a time limit: the task ends with 75 and is made again; nothing is failed."""
     with site() as at:
-        at.begin(slow_sweep(48))
+        # Tasks of some seconds: scancel takes that long to reach one.
+        at.begin({**slow_sweep(48), "accuracy": {"solver": "rk4", "step": 2e-6}})
         told = 0
         while told < 2 and at.document()["status"] in ("accepted", "running"):
             for job, task, _, _ in at.slurm.tasks("--states=running")[:1]:
