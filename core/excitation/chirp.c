@@ -125,10 +125,6 @@ static void chirp_band(const Excitation *excitation, double band[2]) {
     band[1] = 2 * (double)PI * chirp_highest(chirp);
 }
 
-static double chirp_fastest(const Excitation *excitation) {
-    return chirp_of(excitation)->rate;
-}
-
 static void chirp_doubt(const Excitation *excitation, const Span *span, const char *pointer,
                         Problem *doubts) {
     const ExcitationChirp *chirp = chirp_of(excitation);
@@ -148,7 +144,6 @@ const ExcitationKind excitation_chirp = {
     .kind = {"chirp", "a sine of the base's acceleration whose frequency sweeps evenly",
              chirp_fields, sizeof(ExcitationChirp)},
     .complete = chirp_complete,
-    .fastest = chirp_fastest,
     .band = chirp_band,
     .interval = chirp_interval,
     .lasts = chirp_lasts,

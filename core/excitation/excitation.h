@@ -30,8 +30,6 @@ typedef struct ExcitationKind {
     // Validates fields that depend on the run and sets their defaults, below `pointer`. NULL: none.
     Status (*complete)(Excitation *excitation, const Span *span, const char *pointer,
                        Problem *problem);
-    // The highest frequency of the base's motion [rad/s]. NULL: no higher than its samples show.
-    double (*fastest)(const Excitation *excitation);
     // The lowest and the highest of the base's main frequencies [rad/s]. NULL: unknown.
     void (*band)(const Excitation *excitation, double band[2]);
     // Between the samples of the base [s]. NULL: the base has a closed form.

@@ -55,12 +55,8 @@ static Base sine_form(const Excitation *excitation) {
     return (Base){.form = BASE_SINE, .amplitude = sine_amplitude(sine), .omega = sine_omega(sine)};
 }
 
-static double sine_fastest(const Excitation *excitation) {
-    return sine_omega(sine_of(excitation));
-}
-
 static void sine_band(const Excitation *excitation, double band[2]) {
-    band[0] = band[1] = sine_fastest(excitation);
+    band[0] = band[1] = sine_omega(sine_of(excitation));
 }
 
 static void sine_doubt(const Excitation *excitation, const Span *span, const char *pointer,
@@ -72,7 +68,6 @@ const ExcitationKind excitation_sine = {
     .kind = {"sine", "a sine of the base's acceleration or displacement", sine_fields,
              sizeof(ExcitationSine)},
     .complete = sine_complete,
-    .fastest = sine_fastest,
     .band = sine_band,
     .amplitude = offsetof(ExcitationSine, amplitude),
     .form = sine_form,

@@ -98,11 +98,18 @@ static bool cost_is_kinked(const Simulation *simulation) {
     return ratio > 0 && !(ratio > 0.5 && fabs(ratio - nearbyint(ratio)) < 1e-9 * ratio);
 }
 
-// A base in closed form that moves all the time [rad/s]; 0: another one.
-static double cost_base_rate(const Scene *scene) {
+// The highest of the base's main frequencies [rad/s]; 0: unknown.
+static double cost_base_top(const Scene *scene) {
     const Excitation *excitation = scene_excitation(scene);
-    const ExcitationKind *kind = excitation_kind(excitation);
-    return kind->interval == NULL && kind->fastest != NULL ? kind->fastest(excitation) : 0;
+    double band[2] = {0};
+    if (excitation_kind(excitation)->band != NULL)
+        excitation_kind(excitation)->band(excitation, band);
+    return band[1];
+}
+
+// Of a sine [rad/s]; 0: another base.
+static double cost_base_rate(const Scene *scene) {
+    return excitation_kind(scene_excitation(scene)) == &excitation_sine ? cost_base_top(scene) : 0;
 }
 
 // The fastest motion in flight [rad/s].
@@ -137,7 +144,7 @@ static void cost_motions(const Scene *scene, const StructureRates *rates, CostMo
     const ExcitationKind *kind = excitation_kind(excitation);
     const double damping = rates->damping_ratio, duration = scene->duration;
     const double own = fmax(rates->slowest, 1 / duration), start = fmin(rates->slowest / own, 1);
-    const bool is_driven = kind->interval != NULL || kind->fastest != NULL;
+    const bool is_driven = kind->interval != NULL || kind == &excitation_sine;
     double amplitude = 0, base = kind == &excitation_free ? 0 : 1, band[2] = {0};
     for (size_t i = 0; i < excitation->displacement.count; i++)
         amplitude = fmax(amplitude, fabs(excitation->displacement.at[i]));
@@ -304,12 +311,10 @@ double cost_truncation(const Simulation *simulation) {
     StructureRates rates;
     if (structure_rates(structure, SIZE_MAX, &rates) != STATUS_OK)
         rates = (StructureRates){0}; // without memory: the run reports it
-    const ExcitationKind *kind = excitation_kind(excitation);
-    double band[2] = {0};
-    if (kind->interval == NULL && kind->band != NULL)
-        kind->band(excitation, band);
+    const bool has_form = excitation_kind(excitation)->interval == NULL;
     return truncation_cost(scene->duration, scene->sample_rate,
-                           simulation_base_interval(simulation), fmax(band[1], rates.fastest),
+                           simulation_base_interval(simulation),
+                           fmax(has_form ? cost_base_top(scene) : 0, rates.fastest),
                            structure_storeys(structure)) +
            cost_base(simulation, &(double){0});
 }

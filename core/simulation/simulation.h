@@ -49,7 +49,7 @@ typedef struct SimulationLimits {
     // Predicted solver steps. A run is refused above this number, and stopped at
     // SIMULATION_PATIENCE times this number if the prediction was too low.
     double steps;
-    double bytes;          // predicted memory of a run
+    double bytes;          // predicted memory of a run, and that of its list of impacts
     double document_bytes; // predicted size of the spectra in a database
     size_t points;         // of a sweep; 0: the default
 } SimulationLimits;
