@@ -16,16 +16,12 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import program  # noqa: E402
 from daemon import Daemon  # noqa: E402
 from disk import fill, small_disk  # noqa: E402
-from site_of_slurm import ensemble, main, site, slow_sweep, sweep, tasks_of, wanted  # noqa: E402
+from site_of_slurm import all_are_sent, ensemble, main, site, slow_sweep, sweep, tasks_of, wanted  # noqa: E402
 from slurm import until  # noqa: E402
 
 NIGHTLY = True
 KILLS_DAEMON = "os.kill(os.getppid(), signal.SIGKILL)\n"
 IN_QUEUE = "subprocess.run(['squeue', '-h', '-r'], capture_output=True, text=True).stdout.count(chr(10))"
-
-
-def all_are_sent(cluster):
-    return cluster["chunks"] > 0 and cluster["running"] + cluster["queued"] == cluster["chunks"]
 
 
 def until_dead(at):
@@ -75,9 +71,7 @@ def test_a_daemon_that_is_killed_while_it_takes_files():
 def test_a_daemon_that_ends_in_order():
     """SIGTERM leaves the tasks to Slurm; the next daemon takes their files, also when Slurm has forgotten the tasks."""
     with site() as at:
-        at.slurm.close_gate()
-        at.begin(ensemble())
-        at.until(all_are_sent)
+        at.queue(ensemble())
         at.daemon.stop(60)
         at.daemon = None
         assert len(at.slurm.tasks()) == 12
@@ -94,9 +88,7 @@ def test_a_daemon_that_ends_in_order():
 def test_a_restart_while_the_cluster_has_fewer_slots():
     """The chunks of a study that was begun stay as they were cut, whatever the cluster has by now."""
     with site() as at:
-        at.slurm.close_gate()
-        at.begin(ensemble())
-        at.until(all_are_sent)
+        at.queue(ensemble())
         at.kill()
         at.slurm.open_gate()
         until(lambda: not at.slurm.tasks(), "tasks that do not end")
@@ -144,9 +136,7 @@ def test_two_copies_of_each_task():
 def test_a_full_disk_that_later_has_room():
     """Nothing fits into the shared folder: the study waits, says so, and goes on when there is room; no attempt is lost."""
     with small_disk() as shared, site(shared) as at:
-        at.slurm.close_gate()
-        at.begin(sweep())
-        at.until(all_are_sent)
+        at.queue(sweep())
         ballast = fill(shared)
         at.slurm.open_gate()
         at.until_reason("full", "No space")
@@ -195,9 +185,7 @@ def test_a_controller_that_is_away():
 def test_a_controller_that_is_away_at_the_start_and_at_the_end():
     """A daemon that starts without slurmctld waits for it; a study that is cancelled meanwhile is cleaned up later."""
     with site() as at:
-        at.slurm.close_gate()
-        at.begin(sweep())
-        at.until(all_are_sent)
+        at.queue(sweep())
         at.kill()
         at.slurm.end("slurmctld")
         at.start()
@@ -213,9 +201,7 @@ def test_squeue_that_fails_or_hangs():
     """While nothing is known nothing is submitted, though files come and tasks are lost; then all goes on."""
     for code, said in (("sys.exit('squeue: error: out of order')", "out of order"), ("time.sleep(100)", "did not answer")):
         with site() as at:
-            at.slurm.close_gate()
-            at.begin(sweep())
-            at.until(all_are_sent)
+            at.queue(sweep())
             at.slurm.wrap("squeue", code)
             at.slurm.call("scancel", "--state=pending", *{job for job, _, _, _ in at.slurm.tasks()})
             at.until_reason(said)
@@ -279,9 +265,7 @@ def test_a_shared_folder_that_is_away():
     """Not mounted, or another folder in its place: nothing is judged, sent or made there until it is back."""
     for is_replaced in (True, False):
         with site() as at:
-            at.slurm.close_gate()
-            at.begin(sweep())
-            at.until(all_are_sent)
+            at.queue(sweep())
             os.rename(at.shared, at.shared + ".away")
             if is_replaced:
                 os.mkdir(at.shared, 0o700)
@@ -300,9 +284,7 @@ def test_digits_of_another_machine():
     """A chunk whose runs differ in one bit, its digest right: the server's own run tells, and the chunk is made again."""
     for scene in (sweep(), ensemble()):
         with site() as at:
-            at.slurm.close_gate()
-            at.begin(scene)
-            at.until(all_are_sent)
+            at.queue(scene)
             at.kill()
             at.slurm.open_gate()
             until(lambda: not at.slurm.tasks(), "tasks that do not end")
@@ -323,9 +305,7 @@ def test_digits_of_another_machine():
 def test_two_servers_with_one_folder():
     """Each makes the same study: a cancel at the one, and its tidying up, leave the other's tasks and files alone."""
     with site() as at, Daemon(program.build, *at.options, environment=at.slurm.environment) as other:
-        at.slurm.close_gate()
-        at.begin(sweep())
-        at.until(all_are_sent)
+        at.queue(sweep())
         job = other.submit(sweep(), headers={"Prefer": "respond-async"}).json()["id"]
         until(lambda: len(at.slurm.tasks()) == 24, at.slurm.tasks)
         assert len(os.listdir(at.shared)) == 2
@@ -423,9 +403,7 @@ def test_tasks_that_are_held():
 def test_a_study_that_is_cancelled_and_wanted_again():
     """Wanted again while its tasks are still being cancelled: they are adopted, and not cancelled any more."""
     with site() as at:
-        at.slurm.close_gate()
-        at.begin(sweep())
-        at.until(all_are_sent)
+        at.queue(sweep())
         at.slurm.wrap("scancel", "sys.exit('scancel: error: out of order')")
         at.daemon.request("DELETE", f"/v1/jobs/{at.job}")
         until(lambda: at.slurm.calls("scancel"), "the study is not tidied up")
@@ -441,9 +419,7 @@ def test_a_folder_that_is_deleted():
     """rm -r of a study's folder, or of a part of it, while tasks run and wait: it is made again, and so is what was lost."""
     for scene, part in ((sweep(), ""), (ensemble(), ""), (sweep(), "chunks"), (sweep(), "study"), (sweep(), "start")):
         with site() as at:
-            at.slurm.close_gate()
-            at.begin(scene)
-            at.until(all_are_sent)
+            at.queue(scene)
             path = os.path.join(at.shared, at.name(), part)
             shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
             at.slurm.open_gate()
@@ -453,9 +429,7 @@ def test_a_folder_that_is_deleted():
 def test_a_folder_that_is_a_link():
     """A study's folder that was moved and linked: it is used, and what is deleted in the end is the link alone."""
     with site() as at, tempfile.TemporaryDirectory() as other:
-        at.slurm.close_gate()
-        at.begin(sweep())
-        at.until(all_are_sent)
+        at.queue(sweep())
         path, moved = os.path.join(at.shared, at.name()), os.path.join(other, "moved")
         shutil.move(path, moved)
         os.symlink(moved, path)
@@ -479,9 +453,7 @@ def test_a_restart_without_the_cluster():
     """Threads finish what the cluster began; what it left is tidied up when there is a cluster again."""
     for scene in (sweep(), ensemble()):
         with site() as at:
-            at.slurm.close_gate()
-            at.begin(scene)
-            at.until(all_are_sent)
+            at.queue(scene)
             at.kill()
             options, at.options = at.options, []
             at.start()

@@ -82,6 +82,10 @@ def upload(daemon):
         assert daemon.request("POST", "/v1/records", json=quake(seed)).status in (200, 201)
 
 
+def all_are_sent(cluster):
+    return cluster["chunks"] > 0 and cluster["running"] + cluster["queued"] == cluster["chunks"]
+
+
 class Site:
     """One study at a time: begin it, disturb it, ends_well."""
 
@@ -104,6 +108,12 @@ class Site:
             self.start()
         self.scene = scene
         self.job = self.daemon.submit(scene, headers=ASYNC).json()["id"]
+
+    def queue(self, scene):
+        """Submits the scene: all its tasks are queued, and none begins before the gate is opened."""
+        self.slurm.close_gate()
+        self.begin(scene)
+        self.until(all_are_sent)
 
     def document(self):
         return self.daemon.get(f"/v1/jobs/{self.job}").json()
