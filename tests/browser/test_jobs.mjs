@@ -89,6 +89,7 @@ test("Chosen runs are compared, renamed and deleted", async ({ page, daemon, url
   await page.getByRole("button", { name: "Choose all" }).click();
   await page.getByRole("link", { name: "Compare" }).nth(1).click();
   await leads(page, new RegExp(`compare\\?a=${first.result}&b=${second.result}`));
+  await page.getByRole("heading", { name: "Compare", level: 1 }).waitFor();
   await page.goBack();
   await page.getByRole("button", { name: "Choose all" }).click();
   await page.getByLabel("Search").fill("mine 2");
