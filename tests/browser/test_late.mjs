@@ -1,7 +1,7 @@
 // Answers that come late, as on a slow line: what is newer stays, a page that was left touches nothing, no click is lost or counts
 // twice.
 import assert from "node:assert/strict";
-import { hold, leads, says, test, until } from "./support.mjs";
+import { hold, leads, says, tabTo, test, until } from "./support.mjs";
 
 const main = (page) => page.getByRole("main");
 const button = (page, name) => page.getByRole("button", { name, exact: true });
@@ -50,6 +50,21 @@ test("A search that another page overtook does not come back", async ({ page, ur
   await list.letGo();
   assert.equal(await heading(page, "Ground motions").count(), 1);
   assert.match(page.url(), /#\/records$/);
+});
+
+test("The menu of comparisons keeps the focus when its materials come", async ({ page, daemon, url }) => {
+  const ran = await daemon.run("paper_free_sponge");
+  await page.goto(url(`#/results/${ran.result}`));
+  await says(heading(page), /sponge/);
+  const list = await hold(page, /\/v1\/materials\?/);
+  await tabTo(page, page.getByRole("button", { name: /^Compare with/ }));
+  await page.keyboard.press("Enter");
+  await list.asked();
+  const earlier = page.getByRole("link", { name: "An earlier run …" });
+  await tabTo(page, earlier);
+  await list.letGo();
+  await button(page, "Aluminium").waitFor();
+  assert.ok(await earlier.evaluate((link) => link === document.activeElement));
 });
 
 test("The example that was asked for last is the one that stays", async ({ page, url }) => {

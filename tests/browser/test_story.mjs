@@ -81,6 +81,7 @@ test("By keyboard alone: run, look at another impact, zoom and back, play, downl
   await page.evaluate(() => document.activeElement.blur());
   await press(page.getByRole("navigation").getByRole("link", { name: "Records" }));
   await leads(page, /#\/records/);
+  await page.getByRole("heading", { name: "Ground motions", level: 1 }).waitFor(); // the page takes the focus before it
   await page.evaluate(() => document.activeElement.blur());
   await press(button(page, "Use dark colours"));
   await button(page, "Use light colours").waitFor();

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import fs from "node:fs";
-import { says, test } from "./support.mjs";
+import { says, test, until } from "./support.mjs";
 
 test("A service with tokens asks for one, refuses a wrong one, works with a right one, and its files can be saved", async ({ page, daemon, url, refused }) => {
   if (!daemon.program) return; // a service that runs already has its own
@@ -33,6 +33,7 @@ test("A service with tokens asks for one, refuses a wrong one, works with a righ
 
   await page.getByRole("button", { name: "Token" }).click();
   await dialog.getByRole("button", { name: "Forget the one in use" }).click();
+  await until("it to be forgotten", () => page.evaluate(() => !sessionStorage.getItem("impactd.token")));
   await page.reload();
   await dialog.getByRole("button", { name: "Not now" }).click();
   await says(page.getByRole("alert").first(), /token/i);

@@ -51,7 +51,8 @@ function Choices({ result, run }) {
     async (signal) => (await get("v1/materials", { limit: 200 }, signal)).materials,
     [id],
   );
-  return html`${
+  // The link comes first: preact takes what follows something that is loaded out of the page and puts it back, without the focus.
+  return html`<a class="menu-link" href=${link("compare", { a: id })}>An earlier run …</a> ${
       scene.dampers.length > 0 &&
       html`<${Loaded} loaded=${loaded}>
         ${(materials) =>
@@ -60,7 +61,7 @@ function Choices({ result, run }) {
               html`<${Button} isQuiet onClick=${() => void run(choice)}>${choice.label}<//>`,
           )}
       <//>`
-    } <a class="menu-link" href=${link("compare", { a: id })}>An earlier run …</a>`;
+    }`;
 }
 
 export function CompareMenu({ result }) {
