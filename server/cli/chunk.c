@@ -49,10 +49,9 @@ static bool chunk_make_members(const ChunkMaking *making, FILE *pipe) {
             fprintf(stderr, "impactd chunk: %s\n", problem.detail);
             return false;
         }
-        part_blob_write(&bytes, part);
-        const uint64_t size = bytes.count;
-        if (bytes.is_failed || fwrite(&size, sizeof size, 1, pipe) != 1 ||
-            fwrite(bytes.at, 1, bytes.count, pipe) != bytes.count || fflush(pipe) != 0) {
+        chunk_add(&bytes, part);
+        if (bytes.is_failed || fwrite(bytes.at, 1, bytes.count, pipe) != bytes.count ||
+            fflush(pipe) != 0) {
             fprintf(stderr, "impactd chunk: a run cannot be handed over: %s\n",
                     bytes.is_failed ? "no memory" : strerror(errno));
             return false;

@@ -9,7 +9,6 @@
 
 #include "server/cli/command.h"
 #include "server/jobs/jobs.h"
-#include "server/jobs/slurm.h"
 #include "server/jobs/sweep.h"
 
 enum { WAIT_S = 120, END_S = 10, PER_S = 20 };
@@ -108,13 +107,12 @@ static Status trial_run(const ClusterSettings *cluster, Problem *problem) {
 }
 
 Status cluster_check(const ClusterSettings *cluster, Problem *problem) {
-    const SlurmSettings slurm = {cluster->partition, &cluster->options};
     ClusterSettings own = *cluster;
     SlurmFacts facts;
     char folder[2100];
     TRY(cluster_check_folder(cluster->shared, problem));
     printf("ok    folder       %s: only this user may write to it\n", cluster->shared);
-    TRY(slurm_facts(&slurm, &facts, problem));
+    TRY(slurm_facts(&cluster->slurm, &facts, problem));
     if (facts.reason[0] != '\0')
         return problem_set(problem, STATUS_BUSY, "no node of the partition takes jobs: %s",
                            facts.reason);

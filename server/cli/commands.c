@@ -228,11 +228,9 @@ const Command *command_find(const char *name) {
     for (size_t i = 0; commands[i] != NULL; i++)
         if (strcmp(commands[i]->name, name) == 0)
             return commands[i];
-    static const Command *const unlisted[] = {&command_complete, &command_chunk};
-    for (size_t i = 0; i < COUNT(unlisted); i++)
-        if (strcmp(unlisted[i]->name, name) == 0)
-            return unlisted[i];
-    return NULL;
+    return strcmp(name, command_complete.name) == 0 ? &command_complete
+           : strcmp(name, command_chunk.name) == 0  ? &command_chunk
+                                                    : NULL;
 }
 
 static void overview_print(FILE *file) {

@@ -390,8 +390,8 @@ static Status plan_show(const char *path, const Bytes *text, void *of, Problem *
 
 static int check(const Command *self, void *settings, const Options *options, Problem *problem) {
     const RunSettings *asked = settings;
-    const ClusterSettings cluster = {
-        .shared = asked->shared, .partition = asked->partition, .options = asked->sbatch_option};
+    const ClusterSettings cluster = {.shared = asked->shared,
+                                     .slurm = {asked->partition, asked->sbatch_option}};
     if (asked->executor == EXECUTOR_SLURM)
         return command_end(self, cluster_check(&cluster, problem), problem);
     return input_command(self, "scene", options, settings, plan_show, problem);

@@ -351,8 +351,7 @@ static Status serve_open_jobs(App *app, const ServeSettings *settings, Problem *
         .keep = {settings->keep_days, settings->keep_jobs, settings->keep_bytes},
         .cluster = {.shared = settings->executor == EXECUTOR_SLURM ? settings->shared : NULL,
                     .data = settings->data,
-                    .partition = settings->partition,
-                    .options = settings->sbatch_option,
+                    .slurm = {settings->partition, settings->sbatch_option},
                     .seconds = settings->cluster_seconds,
                     .poll_seconds = settings->cluster_poll,
                     .attempts = 5}};

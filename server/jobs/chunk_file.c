@@ -1,9 +1,9 @@
-#define _DEFAULT_SOURCE // strsep
+#define _GNU_SOURCE // nftw, strsep
 #include "server/jobs/chunk_file.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <ftw.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -17,6 +17,7 @@
 #include "server/db/records.h"
 #include "server/jobs/documents.h"
 #include "server/jobs/jobs_private.h"
+#include "server/jobs/sweep.h"
 #include "server/json/encode.h"
 #include "server/json/parse.h"
 
@@ -97,9 +98,7 @@ static size_t chunk_plan_each(const ChunkPlan *plan) {
 size_t chunk_plan_count(const ChunkPlan *plan, size_t chunk) {
     const size_t each = chunk_plan_each(plan);
     if (plan->is_strided)
-        return chunk >= plan->members
-                   ? 0
-                   : (size_t)((plan->members - chunk + plan->chunks - 1) / plan->chunks);
+        return sweep_rows_of(&(SweepRow){.points = plan->members, .chunks = plan->chunks}, chunk);
     const size_t first = chunk * each, left = first < plan->members ? plan->members - first : 0;
     return left < each ? left : each;
 }
@@ -116,7 +115,7 @@ static Status file_fault(Problem *problem, const char *path, const char *what) {
                        "%s: %.300s cannot be %s", strerror(error), path, what);
 }
 
-Status chunk_folder_put(const char *folder, const char *name, const Bytes *bytes,
+Status chunk_folder_put(const char *folder, const char *name, const void *data, size_t size,
                         Problem *problem) {
     char path[PATH_MAX], fresh[PATH_MAX], host[64] = "";
     (void)gethostname(host, sizeof host - 1);
@@ -125,8 +124,8 @@ Status chunk_folder_put(const char *folder, const char *name, const Bytes *bytes
     FILE *file = fopen(fresh, "we");
     if (file == NULL)
         return file_fault(problem, fresh, "made");
-    const bool is_written = fwrite(bytes->at, 1, bytes->count, file) == bytes->count &&
-                            fflush(file) == 0 && fsync(fileno(file)) == 0;
+    const bool is_written =
+        fwrite(data, 1, size, file) == size && fflush(file) == 0 && fsync(fileno(file)) == 0;
     const int error = errno;
     const bool is_closed = fclose(file) == 0;
     errno = is_written ? errno : error;
@@ -147,9 +146,8 @@ static Status file_get(const char *path, Bytes *bytes, Problem *problem) {
     if (file < 0)
         return errno == ENOENT ? problem_set(problem, STATUS_NOT_FOUND, "there is no %.300s", path)
                                : file_fault(problem, path, "opened");
-    while ((count = read(file, block, sizeof block)) > 0 || (count < 0 && errno == EINTR))
-        if (count > 0)
-            bytes_put(bytes, block, (size_t)count);
+    while ((count = read(file, block, sizeof block)) > 0)
+        bytes_put(bytes, block, (size_t)count);
     const Status status = count == 0 ? STATUS_OK : file_fault(problem, path, "read");
     (void)close(file);
     if (status != STATUS_OK || !bytes->is_failed)
@@ -158,22 +156,14 @@ static Status file_get(const char *path, Bytes *bytes, Problem *problem) {
                           : problem_set(problem, STATUS_NO_MEMORY, "no memory for %.300s", path);
 }
 
-static void path_remove(const char *path, int depth) {
-    char inner[PATH_MAX];
-    const struct dirent *entry;
-    DIR *list = unlink(path) != 0 && depth > 0 ? opendir(path) : NULL;
-    while (list != NULL && (entry = readdir(list)) != NULL) {
-        snprintf(inner, sizeof inner, "%.3000s/%s", path, entry->d_name);
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
-            path_remove(inner, depth - 1);
-    }
-    if (list != NULL)
-        (void)closedir(list);
-    (void)rmdir(path);
+static int path_remove(const char *path, const struct stat *facts, int kind, struct FTW *place) {
+    (void)facts, (void)kind, (void)place;
+    (void)remove(path);
+    return 0;
 }
 
 void chunk_folder_remove(const char *folder) {
-    path_remove(folder, 2);
+    (void)nftw(folder, path_remove, 8, FTW_DEPTH | FTW_PHYS);
 }
 
 // --- the study ---
@@ -232,8 +222,9 @@ Status chunk_folder_make(const char *folder, ChunkPlan *plan, ChunkKey *key, Pro
         return STATUS_OK;
     encode_item(&text, plan_fields, plan, WRITE_SCENE);
     sha256_sum(text.at, text.count, key->digest);
-    const Status status = text.is_failed ? study_result(STATUS_NO_MEMORY, problem)
-                                         : chunk_folder_put(folder, "study", &text, problem);
+    const Status status = text.is_failed
+                              ? study_result(STATUS_NO_MEMORY, problem)
+                              : chunk_folder_put(folder, "study", text.at, text.count, problem);
     bytes_clear(&text);
     return status;
 }
@@ -267,20 +258,21 @@ void chunk_begin(Bytes *bytes, const ChunkKey *key, size_t chunk, size_t count) 
     bytes_put(bytes, &head, sizeof head);
 }
 
-void chunk_add(Bytes *bytes, const void *part, size_t size) {
-    const uint64_t length = size;
+void chunk_add(Bytes *bytes, const StudyPart *part) {
+    const size_t at = bytes->count;
+    uint64_t length = 0;
     bytes_put(bytes, &length, sizeof length);
-    bytes_put(bytes, part, size);
+    part_blob_write(bytes, part);
+    length = bytes->count - at - sizeof length;
+    if (!bytes->is_failed)
+        memcpy(bytes->at + at, &length, sizeof length);
 }
 
 void chunk_add_failure(Bytes *bytes, Status status, char *why) {
     StudyPart part = {.run = {.status = status, .why = why, .steps = (double)NAN}};
-    Bytes one = {0};
     (void)fields_default(summary_fields, &part.run.summary);
     (void)fields_default(reduction_fields, &part.run.reduction);
-    part_blob_write(&one, &part);
-    chunk_add(bytes, one.at, one.count);
-    bytes_clear(&one);
+    chunk_add(bytes, &part);
 }
 
 Status chunk_save(const char *folder, size_t chunk, Bytes *bytes, Problem *problem) {
@@ -289,8 +281,8 @@ Status chunk_save(const char *folder, size_t chunk, Bytes *bytes, Problem *probl
     snprintf(name, sizeof name, "chunks/%zu", chunk);
     sha256_sum(bytes->at, bytes->count, digest);
     bytes_put(bytes, digest, sizeof digest);
-    return bytes->is_failed ? problem_set(problem, STATUS_NO_MEMORY, "no memory for a chunk")
-                            : chunk_folder_put(folder, name, bytes, problem);
+    return bytes->is_failed ? study_result(STATUS_NO_MEMORY, problem)
+                            : chunk_folder_put(folder, name, bytes->at, bytes->count, problem);
 }
 
 // Why it is not this chunk of this study; NULL: it is.
@@ -314,8 +306,7 @@ static const char *chunk_fault(const ChunkPlan *plan, const ChunkKey *key, size_
     file->bytes.count = end;
     for (file->at = sizeof head; chunk_next(file, &part, &size);)
         count++;
-    if (file->at != end || count == 0 || count != head.count ||
-        count != chunk_plan_count(plan, chunk))
+    if (file->at != end || count != head.count || count != chunk_plan_count(plan, chunk))
         return "has other members";
     file->at = sizeof head;
     return NULL;

@@ -64,14 +64,15 @@ Status chunk_folder_make(const char *folder, ChunkPlan *plan, ChunkKey *key, Pro
 Status chunk_folder_read(const char *folder, ChunkPlan *plan, ChunkKey *key, StudyRequest *request,
                          Problem *problem);
 // Writes FOLDER/NAME. STATUS_FULL, STATUS_IO.
-Status chunk_folder_put(const char *folder, const char *name, const Bytes *bytes, Problem *problem);
+Status chunk_folder_put(const char *folder, const char *name, const void *data, size_t size,
+                        Problem *problem);
 // Deletes the folder and all that is in it; of a symbolic link only that.
 void chunk_folder_remove(const char *folder);
 
 // The bytes of a chunk: begin, then each part, then save.
 void chunk_begin(Bytes *bytes, const ChunkKey *key, size_t chunk, size_t count);
-void chunk_add(Bytes *bytes, const void *part, size_t size);    // by part_blob_write
-void chunk_add_failure(Bytes *bytes, Status status, char *why); // a part: a run that failed
+void chunk_add(Bytes *bytes, const StudyPart *part);
+void chunk_add_failure(Bytes *bytes, Status status, char *why); // a run that failed
 // STATUS_FULL, STATUS_IO.
 Status chunk_save(const char *folder, size_t chunk, Bytes *bytes, Problem *problem);
 

@@ -65,7 +65,6 @@ typedef struct ClusterStudy {
 struct Cluster {
     JobManager *manager;
     const ClusterSettings *settings;
-    SlurmSettings slurm;
     char program[PATH_MAX], id[9];
     ino_t shared;         // number of the folder
     pthread_mutex_t lock; // no study's folder is made and deleted at once; of the facts
@@ -102,7 +101,7 @@ static SlurmFacts cluster_facts(Cluster *cluster) {
     SlurmFacts facts;
     pthread_mutex_lock(&cluster->lock);
     if (clock_monotonic_ns() >= cluster->facts_ns) {
-        if (slurm_facts(&cluster->slurm, &facts, NULL) == STATUS_OK)
+        if (slurm_facts(&cluster->settings->slurm, &facts, NULL) == STATUS_OK)
             cluster->facts = facts;
         cluster->facts_ns = clock_monotonic_ns() + seconds_ns(facts_each);
     }
@@ -111,8 +110,8 @@ static SlurmFacts cluster_facts(Cluster *cluster) {
     return facts;
 }
 
-static size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seconds) {
-    if (seconds < cluster->settings->seconds ||
+size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seconds) {
+    if (cluster == NULL || seconds < cluster->settings->seconds ||
         (kind != &study_sweep && kind != &study_ensemble && kind != &study_fragility))
         return 0;
     const size_t slots = cluster_facts(cluster).slots;
@@ -121,7 +120,7 @@ static size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seco
 
 // --- a study ---
 
-static void cluster_study_free(ClusterStudy *study) {
+void cluster_study_free(ClusterStudy *study) {
     if (study == NULL)
         return;
     for (size_t i = 0; study->chunks != NULL && i < study->plan.chunks; i++)
@@ -135,21 +134,18 @@ static void cluster_study_free(ClusterStudy *study) {
 // folder is not mounted, no node would see what is written, and no file of theirs be seen here.
 static Status study_write(ClusterStudy *study, Problem *problem) {
     const char *shared = study->cluster->settings->shared;
-    Bytes start = {0};
     struct stat facts;
     if (stat(shared, &facts) != 0 || facts.st_ino != study->cluster->shared)
         return problem_set(problem, STATUS_IO,
                            "%.160s is not the folder that it was when the server started: mount "
                            "it, or start the server again",
                            shared);
-    bytes_text(&start, slurm_start);
     pthread_mutex_lock(&study->cluster->lock);
     Status status = chunk_folder_make(study->folder, &study->plan, &study->key, problem);
     if (status == STATUS_OK)
-        status = start.is_failed ? study_result(STATUS_NO_MEMORY, problem)
-                                 : chunk_folder_put(study->folder, "start", &start, problem);
+        status =
+            chunk_folder_put(study->folder, "start", slurm_start, strlen(slurm_start), problem);
     pthread_mutex_unlock(&study->cluster->lock);
-    bytes_clear(&start);
     return status;
 }
 
@@ -165,7 +161,8 @@ static Status study_plan(ClusterStudy *study, size_t slots, Problem *problem) {
     return study_write(study, problem);
 }
 
-static Status cluster_prepare(Cluster *cluster, StudyRun *run, size_t slots, Problem *problem) {
+Status cluster_prepare(StudyRun *run, size_t slots, Problem *problem) {
+    Cluster *cluster = run->manager->cluster;
     ClusterStudy *study = run->cluster = calloc(1, sizeof *study);
     if (study == NULL)
         return study_result(STATUS_NO_MEMORY, problem);
@@ -194,7 +191,7 @@ static Status cluster_prepare(Cluster *cluster, StudyRun *run, size_t slots, Pro
     return STATUS_OK;
 }
 
-static void cluster_take(StudyRun *run) {
+void cluster_take(StudyRun *run) {
     ClusterStudy *study = run->cluster;
     Cluster *cluster = study->cluster;
     run->task->workers++;
@@ -315,15 +312,17 @@ static Status chunk_ingest(ClusterStudy *study, size_t chunk, Problem *problem) 
     if (status == STATUS_OK && !is_early)
         status = chunk_fold(study, chunk, &file, problem);
     bytes_clear(&file.bytes);
-    if (status == STATUS_NOT_FOUND) // it was there a moment ago; its task says what happened
-        of->has_file = false;
     if (status == STATUS_INVALID) {
         (void)unlink(path);
         chunk_is_lost(study, chunk, false, problem->detail, problem);
     }
-    if (status == STATUS_NOT_FOUND || status == STATUS_INVALID || (status == STATUS_OK && is_early))
+    if (status == STATUS_NOT_FOUND) // it was there a moment ago; its task says what happened
+        of->has_file = false;
+    if (status == STATUS_INVALID || status == STATUS_NOT_FOUND)
         return STATUS_OK;
     TRY(status);
+    if (is_early)
+        return STATUS_OK;
     study_engine_count(&study->run->engine, chunk_plan_count(&study->plan, chunk));
     if (study->run->is_sweep) { // the database has its rows
         (void)unlink(path);
@@ -402,17 +401,16 @@ static void task_log(const ClusterStudy *study, const SlurmTask *task, char text
 // Whether a chunk can be written.
 static Status study_probe(ClusterStudy *study, Problem *problem) {
     const size_t chunk = chunk_plan_count(&study->plan, 0) * study->run->work->part_bytes;
-    Bytes zeros = {.count = 0};
+    const size_t size = chunk > PROBE_BYTES ? chunk : PROBE_BYTES;
+    void *zeros = calloc(1, size);
     char path[PATH_MAX];
     Status status = study_write(study, problem);
-    if (status == STATUS_OK && bytes_reserve(&zeros, chunk > PROBE_BYTES ? chunk : PROBE_BYTES)) {
-        zeros.count = zeros.room - 1;
-        memset(zeros.at, 0, zeros.count);
-        status = chunk_folder_put(study->folder, "chunks/probe", &zeros, problem);
+    if (status == STATUS_OK && zeros != NULL) {
+        status = chunk_folder_put(study->folder, "chunks/probe", zeros, size, problem);
         snprintf(path, sizeof path, "%.3000s/chunks/probe", study->folder);
         (void)unlink(path); // what lies in the folder is seen afresh, too
     }
-    bytes_clear(&zeros);
+    free(zeros);
     study->is_blocked = status != STATUS_OK;
     return status;
 }
@@ -421,12 +419,9 @@ static Status study_probe(ClusterStudy *study, Problem *problem) {
 static void chunk_ended(ClusterStudy *study, size_t chunk, Problem *problem) {
     ClusterChunk *of = &study->chunks[chunk];
     const SlurmTask *task = of->last;
-    char printed[160] = "", why[240], path[PATH_MAX];
+    char printed[160] = "", why[240];
     const int code = task != NULL ? task->exit_code : 0;
-    snprintf(path, sizeof path, "%.3000s/chunks/%zu", study->folder, chunk);
-    if (access(path, F_OK) == 0) {
-        of->has_file = true;
-    } else if (study->is_blocked || code == CHUNK_FULL) { // no attempt
+    if (study->is_blocked || code == CHUNK_FULL) { // no attempt
         of->state = CHUNK_TO_DO;
         of->was_missing = false;
         if (!study->is_blocked)
@@ -455,10 +450,13 @@ static bool study_find_lost(ClusterStudy *study, Status *status, Problem *proble
             chunk->was_missing = true;
             continue;
         }
-        if (!is_probed)
+        if (!is_probed) {
             *status = study_probe(study, problem);
+            (void)study_look(study, NULL);
+        }
         is_probed = true;
-        chunk_ended(study, i, problem);
+        if (!chunk->has_file)
+            chunk_ended(study, i, problem);
     }
     return has_none;
 }
@@ -529,7 +527,7 @@ static Status study_send(ClusterStudy *study, size_t first, Bytes *tasks, Proble
     if (status == STATUS_OK)
         status = study_write(study, problem);
     if (status == STATUS_OK)
-        status = slurm_submit(&study->cluster->slurm, &array, problem);
+        status = slurm_submit(&study->cluster->settings->slurm, &array, problem);
     bytes_clear(tasks);
     return status;
 }
@@ -693,7 +691,7 @@ static void cluster_set_id(Cluster *cluster) {
     snprintf(cluster->id, sizeof cluster->id, "%.8s", hex);
 }
 
-static void cluster_close(Cluster *cluster) {
+void cluster_close(Cluster *cluster) {
     if (cluster == NULL)
         return;
     if (cluster->is_started)
@@ -702,22 +700,14 @@ static void cluster_close(Cluster *cluster) {
     free(cluster);
 }
 
-static const StudyExecutor cluster_executor = {.slots = cluster_slots,
-                                               .prepare = cluster_prepare,
-                                               .take = cluster_take,
-                                               .free = cluster_study_free,
-                                               .close = cluster_close};
-
 Status cluster_open(JobManager *manager, Problem *problem) {
     const ClusterSettings *settings = &manager->settings.cluster;
     Cluster *cluster = manager->cluster = calloc(1, sizeof *cluster);
     struct stat facts;
-    manager->executor = &cluster_executor;
     if (cluster == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the cluster's studies");
     cluster->manager = cluster->worker.manager = manager;
     cluster->settings = settings;
-    cluster->slurm = (SlurmSettings){settings->partition, &settings->options};
     cluster->facts.array_max = 1001; // until Slurm answers
     cluster_set_id(cluster);
     pthread_mutex_init(&cluster->lock, NULL);

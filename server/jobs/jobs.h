@@ -5,6 +5,7 @@
 #include "core/study/study.h"
 #include "server/db/db.h"
 #include "server/jobs/job.h"
+#include "server/jobs/slurm.h"
 
 typedef struct JobManager JobManager;
 
@@ -15,10 +16,9 @@ enum {
 // Where studies of at least `seconds` of predicted CPU time are made: by Slurm, with the files of
 // `shared`.
 typedef struct ClusterSettings {
-    const char *shared;    // folder that all machines see; NULL: no cluster
-    const char *data;      // this server's own folder, which tells it from others
-    const char *partition; // NULL: Slurm's default
-    Texts options;         // further ones for sbatch; borrowed
+    const char *shared; // folder that all machines see; NULL: no cluster
+    const char *data;   // this server's own folder, which tells it from others
+    SlurmSettings slurm;
     double seconds;
     double poll_seconds; // between questions to Slurm, at least
     unsigned attempts;   // at a chunk, before its runs are failed; 1: at anything

@@ -141,26 +141,13 @@ typedef struct Worker {
     Workspace workspace;
 } Worker;
 
-// Makes the members of studies elsewhere. Its state is a Cluster, that of a study a ClusterStudy.
+// Slurm, which makes the members of long studies, and one of these.
 typedef struct Cluster Cluster;
 typedef struct ClusterStudy ClusterStudy;
-typedef struct StudyExecutor {
-    // How many members of a study of this kind and predicted CPU time it makes at once, perhaps a
-    // guess; 0: the workers make them.
-    size_t (*slots)(Cluster *cluster, const StudyKind *kind, double seconds);
-    // Prepares a begun study, of a sweep with its chunks. STATUS_FULL, STATUS_IO: not now.
-    Status (*prepare)(Cluster *cluster, struct StudyRun *run, size_t slots, Problem *problem);
-    // With the manager's lock held, as the next: takes a prepared study, with a turn of it, to its
-    // end.
-    void (*take)(struct StudyRun *run);
-    void (*free)(ClusterStudy *study); // NULL is fine
-    void (*close)(Cluster *cluster);   // ends its thread
-} StudyExecutor;
 
 struct JobManager {
     Db *db;
-    const StudyExecutor *executor; // NULL: the workers make all
-    Cluster *cluster;              // its state
+    Cluster *cluster; // NULL: the workers make all
     JobManagerSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;       // for a worker, or space for its result
@@ -278,9 +265,18 @@ void commit_retry_cancels(JobManager *manager);
 void task_end(Task *task);
 void jobs_call_waiting(JobManager *manager); // all that wait try again
 
-// cluster.c. Makes Slurm the executor of long studies, as the settings say. What runs there when
-// the manager is closed continues, and is taken up after the next start.
+// cluster.c. What runs there when the manager is closed continues, and is taken up after the next
+// start. Closed by cluster_close also after a failure.
 Status cluster_open(JobManager *manager, Problem *problem);
+void cluster_close(Cluster *cluster); // NULL is fine, as below
+// How many members of a study of this kind and predicted CPU time it makes at once, perhaps a
+// guess; 0: the workers make them.
+size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seconds);
+// Prepares a begun study, of a sweep with its chunks. STATUS_FULL, STATUS_IO: not now.
+Status cluster_prepare(struct StudyRun *run, size_t slots, Problem *problem);
+// With the manager's lock held: takes a prepared study, with a turn of it, to its end.
+void cluster_take(struct StudyRun *run);
+void cluster_study_free(ClusterStudy *study);
 
 // resolve.c. Of a prepared request: drops the samples of its records for as long as it waits, and
 // loads them again, with a fault for each that is no longer there.

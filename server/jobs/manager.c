@@ -193,8 +193,7 @@ void jobs_stop(JobManager *manager) {
         return;
     if (manager->is_maintained)
         pthread_join(manager->maintenance, NULL);
-    if (manager->executor != NULL)
-        manager->executor->close(manager->cluster);
+    cluster_close(manager->cluster);
     for (size_t i = 0; i < manager->worker_count; i++)
         pthread_join(manager->workers[i].thread, NULL);
     manager_wait_for_writes(manager);

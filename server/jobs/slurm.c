@@ -40,8 +40,8 @@ Status slurm_submit(const SlurmSettings *settings, const SlurmArray *array, Prob
                  fmax(least_minutes, ceil(array->seconds / 60)));
     if (settings->partition != NULL)
         bytes_format(&text, "--partition=%s\n", settings->partition);
-    for (size_t i = 0; i < settings->options->count; i++)
-        bytes_format(&text, "%s\n", settings->options->at[i]);
+    for (size_t i = 0; i < settings->options.count; i++)
+        bytes_format(&text, "%s\n", settings->options.at[i]);
     // By these the tasks are found and make the right chunks: no option may change them.
     bytes_format(&text,
                  "--parsable\n--job-name=%s\n--array=%s\n--comment=%" PRIu64 "\n--ntasks=1\n"

@@ -9,7 +9,7 @@
 
 typedef struct SlurmSettings {
     const char *partition; // NULL: the cluster's default
-    const Texts *options;  // for sbatch, as "--account=lab"
+    Texts options;         // further ones for sbatch, as "--account=lab"; borrowed
 } SlurmSettings;
 
 // What the file `start` in the folder of a study has: sbatch takes scripts alone, this one becomes

@@ -36,10 +36,6 @@ enum {
 // each has costs of its own.
 static const double chunk_seconds = 0.25, cluster_chunk_seconds = 120;
 
-static Status study_no_memory(Problem *problem) {
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the study");
-}
-
 Status study_engine_open(StudyEngine *engine, StudyWork *work, const SimulationLimits *limits,
                          const Progress *progress, size_t slots, Problem *problem) {
     const size_t by_bytes = WINDOW_BYTES / (work->part_bytes + 1);
@@ -57,7 +53,7 @@ Status study_engine_open(StudyEngine *engine, StudyWork *work, const SimulationL
     if (slots == 0)
         return STATUS_OK;
     engine->parts = calloc(engine->window, sizeof *engine->parts);
-    return engine->parts != NULL ? STATUS_OK : study_no_memory(problem);
+    return study_result(status_made(engine->parts != NULL), problem);
 }
 
 void study_engine_close(StudyEngine *engine) {
@@ -230,7 +226,7 @@ static Status sweep_begin(StudyRun *run, size_t slots, Problem *problem) {
         text_fit(row->result, sizeof row->result, result);
         row->scene = strdup(run->task->scene);
         if (row->scene == NULL)
-            return study_no_memory(problem);
+            return study_result(STATUS_NO_MEMORY, problem);
         row->metrics = metrics;
         row->points = points;
         row->chunks = study_count_chunks(run, (size_t)points, slots);
@@ -264,7 +260,7 @@ static Status sweep_list(StudyRun *run, const SweepChunkRows *saved, Problem *pr
             continue;
         SweepChunk *chunk = calloc(1, sizeof *chunk);
         if (chunk == NULL)
-            return study_no_memory(problem);
+            return study_result(STATUS_NO_MEMORY, problem);
         chunk->count = count;
         chunk->row.sweep = run->sweep.number;
         chunk->row.chunk = i;
@@ -309,17 +305,12 @@ static Status sweep_chunk_load(StudyRun *run, SweepChunk *chunk, Problem *proble
         problem_clear(problem);
     }
     chunk->is_retry = saved.rows.at != NULL && saved.rows.size == size;
-    if (!chunk->is_retry) {
-        sweep_chunk_row_clear(&saved);
-        saved.rows = (StoredBytes){calloc(1, size), size};
-        if (saved.rows.at == NULL)
-            return study_no_memory(problem);
-    }
-    chunk->row.rows = saved.rows;
-    saved.rows = (StoredBytes){NULL, 0};
+    chunk->row.rows = chunk->is_retry ? saved.rows : (StoredBytes){calloc(1, size), size};
+    if (chunk->is_retry)
+        saved.rows = (StoredBytes){NULL, 0};
     sweep_chunk_row_clear(&saved);
-    chunk->is_loaded = true;
-    return STATUS_OK;
+    chunk->is_loaded = chunk->row.rows.at != NULL;
+    return study_result(status_made(chunk->is_loaded), problem);
 }
 
 static void sweep_chunk_add_reason(SweepChunk *chunk, const char *why) {
@@ -375,7 +366,7 @@ static Status sweep_chunk_make(StudyRun *run, SweepChunk *chunk, Workspace *work
 Status sweep_chunk_save(StudyRun *run, SweepChunk *chunk, Problem *problem) {
     if (chunk->reasons.count > 0 &&
         (chunk->row.reasons = bytes_take(&chunk->reasons, NULL)) == NULL)
-        return study_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     TRY(db_sweep_take(run->manager->db, &chunk->row, problem));
     chunk->is_saved = true;
     if (atomic_fetch_sub(&run->chunks_left, 1) == 1)
@@ -390,8 +381,7 @@ void study_run_free(StudyRun *run) {
         run->chunks = chunk->next;
         sweep_chunk_free(chunk);
     }
-    if (run->is_clustered)
-        run->manager->executor->free(run->cluster);
+    cluster_study_free(run->cluster);
     sweep_row_clear(&run->sweep);
     study_engine_close(&run->engine);
     study_free(run->work);
@@ -446,27 +436,24 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
     const Progress members = {run->task, study_advance_task};
     const StudyTools tools = {
         .limits = &settings->limits, .progress = &begin, .workspace = &worker->workspace};
-    const StudyExecutor *executor = manager->executor;
-    run->is_sweep = study_kind(inquiry->study) == &study_sweep;
-    size_t slots = executor == NULL ? 0
-                                    : executor->slots(manager->cluster, study_kind(inquiry->study),
-                                                      run->task->queued.seconds);
+    const StudyKind *kind = study_kind(inquiry->study);
+    const size_t slots = cluster_slots(manager->cluster, kind, run->task->queued.seconds);
+    run->is_sweep = kind == &study_sweep;
     run->is_clustered = slots > 0;
-    slots = run->is_clustered ? slots : settings->workers;
     TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &answer->study, &run->work,
                     problem));
     TRY(study_engine_open(&run->engine, run->work, &settings->limits, &members,
                           run->is_sweep ? 0 : settings->workers, problem));
     if (run->is_sweep)
-        TRY(sweep_open(run, slots, problem));
-    return run->is_clustered ? executor->prepare(manager->cluster, run, slots, problem) : STATUS_OK;
+        TRY(sweep_open(run, run->is_clustered ? slots : settings->workers, problem));
+    return run->is_clustered ? cluster_prepare(run, slots, problem) : STATUS_OK;
 }
 
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
     JobManager *manager = worker->manager;
     StudyRun *run = calloc(1, sizeof *run);
     if (run == NULL)
-        return study_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     const int64_t began_ns = clock_thread_cpu_ns();
     run->manager = manager;
     run->task = task;
@@ -483,7 +470,7 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     run->next = manager->studies;
     manager->studies = run;
     if (run->is_clustered)
-        manager->executor->take(run);
+        cluster_take(run);
     study_enqueue(run);
     pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;

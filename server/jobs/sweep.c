@@ -9,10 +9,6 @@
 
 enum { WINDOW_BYTES = 4 << 20 }; // of rows read at once, more only if one row of each chunk is
 
-static Status sweep_no_memory(Problem *problem) {
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for the sweep");
-}
-
 size_t sweep_rows_of(const SweepRow *row, size_t chunk) {
     return chunk >= row->points ? 0 : (row->points - chunk + row->chunks - 1) / row->chunks;
 }
@@ -74,7 +70,7 @@ static void sweep_row_reason(const SweepChunkRow *chunk, size_t place, char *why
 static Status sweep_view_read_scene(SweepView *view, Problem *problem) {
     Problem *fault = calloc(1, sizeof *fault);
     if (fault == NULL)
-        return sweep_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     Status status = json_parse(view->row.scene, strlen(view->row.scene), study_request_fields,
                                &view->inquiry, fault);
     // A fault here is ours, not the client's.
@@ -187,7 +183,7 @@ Status sweep_view_load(Db *db, const char *id, bool is_job, bool has_failures, S
     TRY(sweep_view_read_scene(view, problem));
     view->sweep = (Sweep *)(void *)variant_new(study_sweep.answer);
     if (view->sweep == NULL)
-        return sweep_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     TRY(sweep_describe(sweep_view_study(view), &view->inquiry.simulation, view->sweep, problem));
     if (view->row.chunks > 0 && view->row.metrics != sweep_view_study(view)->metrics.count)
         return problem_set(problem, STATUS_INTERNAL,

@@ -23,7 +23,7 @@ FLOORS = {
 # processes in the core.
 PURE = set("assert complex ctype errno float immintrin inttypes limits math stdalign stdarg stdatomic stdbool "
            "stddef stdint stdio stdlib string".split())
-SYSTEM = PURE | set("dirent fcntl grp libgen locale netdb poll pthread pwd sched semaphore signal spawn strings "
+SYSTEM = PURE | set("dirent fcntl ftw grp libgen locale netdb poll pthread pwd sched semaphore signal spawn strings "
                     "termios time unistd arpa/inet net/if netinet/in netinet/tcp sys/epoll sys/eventfd "
                     "sys/file sys/ioctl sys/mman sys/random sys/resource sys/select sys/socket sys/stat "
                     "sys/statvfs sys/time sys/types sys/un sys/wait wctype".split())

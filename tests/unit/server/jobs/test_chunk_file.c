@@ -71,11 +71,12 @@ static void shared_close(Shared *shared) {
     assert_int_not_equal(access(shared->folder, F_OK), 0);
 }
 
-static void part_write(const Shared *shared, size_t member, Bytes *bytes) {
+static void part_write(const Shared *shared, size_t member, Bytes *bytes,
+                       void (*write)(Bytes *bytes, const StudyPart *part)) {
     const StudyTools tools = {.limits = &shared->limits};
     StudyPart *part;
     assert_int_equal(study_part_make(shared->work, member, &tools, &part, &problem), STATUS_OK);
-    part_blob_write(bytes, part);
+    write(bytes, part);
     study_part_free(shared->work, part);
 }
 
@@ -83,12 +84,8 @@ static void chunk_make(const Shared *shared, size_t chunk) {
     Bytes bytes = {0};
     const size_t count = chunk_plan_count(&shared->plan, chunk);
     chunk_begin(&bytes, &shared->key, chunk, count);
-    for (size_t i = 0; i < count; i++) {
-        Bytes part = {0};
-        part_write(shared, chunk_plan_member(&shared->plan, chunk, i), &part);
-        chunk_add(&bytes, part.at, part.count);
-        bytes_clear(&part);
-    }
+    for (size_t i = 0; i < count; i++)
+        part_write(shared, chunk_plan_member(&shared->plan, chunk, i), &bytes, chunk_add);
     assert_int_equal(chunk_save(shared->folder, chunk, &bytes, &problem), STATUS_OK);
     bytes_clear(&bytes);
 }
@@ -124,7 +121,7 @@ TEST(a_part_comes_back_and_its_fold_is_the_same) {
     Shared shared;
     shared_open(&shared, 2);
     Bytes bytes = {0}, again = {0};
-    part_write(&shared, 3, &bytes);
+    part_write(&shared, 3, &bytes, part_blob_write);
     StudyPart *part = part_blob_read(shared.work, bytes.at, bytes.count);
     assert_non_null(part);
     assert_true(part->run.status == STATUS_OK && part->run.summary.rms_displacement > 0);
