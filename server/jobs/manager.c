@@ -193,9 +193,9 @@ void jobs_stop(JobManager *manager) {
         return;
     if (manager->is_maintained)
         pthread_join(manager->maintenance, NULL);
-    cluster_close(manager->cluster);
     for (size_t i = 0; i < manager->worker_count; i++)
         pthread_join(manager->workers[i].thread, NULL);
+    cluster_close(manager->cluster); // which workers use to their end
     manager_wait_for_writes(manager);
     pthread_mutex_lock(&manager->lock);
     manager_release_all(manager);

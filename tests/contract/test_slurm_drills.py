@@ -85,6 +85,19 @@ def test_a_daemon_that_ends_in_order():
         at.ends_well()
 
 
+def test_a_daemon_that_ends_while_a_study_begins():
+    """SIGTERM while a worker waits for sinfo: the daemon ends in order, and the next one makes the study."""
+    with site() as at:
+        at.slurm.wrap("sinfo", "time.sleep(3)")
+        at.begin(sweep())
+        until(lambda: at.slurm.calls("sinfo"), "a call of sinfo")
+        at.daemon.stop(60)
+        assert "Sanitizer" not in at.daemon.stderr(), at.daemon.stderr()
+        at.slurm.unwrap()
+        at.start()
+        at.ends_well()
+
+
 def test_a_restart_while_the_cluster_has_fewer_slots():
     """The chunks of a study that was begun stay as they were cut, whatever the cluster has by now."""
     with site() as at:
