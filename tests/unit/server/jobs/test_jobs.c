@@ -345,6 +345,122 @@ TEST(a_dismissed_job_is_dismissed_for_all_before_the_store_has_it) {
     room_end(&room);
 }
 
+TEST(a_job_that_is_dismissed_while_it_is_inserted_is_dismissed_in_the_store) {
+    Room room = room_make(1);
+    Job *job = submit_unkept(&room, 0.015, 20000), *found = NULL;
+    JobView now = show(job);
+    char path[128];
+    Sqlite *other;
+    JobStats stats;
+    snprintf(path, sizeof path, "%s/impactd.db", room.directory);
+    assert_int_equal(sqlite_open(path, DATABASE_WRITER, &other, &problem), STATUS_OK);
+    assert_int_equal(sqlite_execute(other, "BEGIN IMMEDIATE", &problem), STATUS_OK);
+    job_save(job);
+    assert_int_equal(jobs_cancel(room.manager, now.row.id, &found, &problem), STATUS_OK);
+    assert_ptr_equal(found, job);
+    job_unref(found);
+    assert_true(job_is_finished(job));
+    assert_int_equal(sqlite_execute(other, "ROLLBACK", &problem), STATUS_OK);
+    sqlite_close(other);
+    assert_int_equal(wait_until_kept(job, &problem), STATUS_OK);
+    jobs_stats(room.manager, &stats);
+    assert_int_equal(stats.unfinished, 0);
+    room_close_jobs(&room, job);
+    room_open(&room);
+    assert_int_equal(jobs_find(room.manager, now.row.id, &job, &problem), STATUS_OK);
+    job_view_clear(&now);
+    now = show(job);
+    assert_int_equal(now.row.state, JOB_DISMISSED);
+    job_view_clear(&now);
+    room_close_jobs(&room, job);
+    scratch_remove(room.directory);
+}
+
+TEST(a_manager_that_stops_computes_nothing_more) {
+    Room room = room_make(1);
+    static atomic_int wakes;
+    const Callback callback = {&wakes, note_wake};
+    char text[1024];
+    Outcome *outcome = NULL;
+    Job *job = submit(&room, 0.015, 1), *none = NULL;
+    wait_for(job);
+    JobView now = show(job);
+    room_close_jobs(&room, job);
+    room_open(&room); // with nothing in memory
+    jobs_stop(room.manager);
+    scene_text(text, 0.02, 1, "sponge");
+    assert_int_equal(submit_text(room.manager, text, &none, &problem), STATUS_BUSY);
+    assert_non_null(strstr(problem.detail, "stopping"));
+    assert_null(none);
+    problem_clear(&problem);
+    assert_int_equal(jobs_outcome(room.manager, now.row.result, &callback, &outcome, &problem),
+                     STATUS_BUSY);
+    assert_non_null(strstr(problem.detail, "cannot be computed now"));
+    assert_null(outcome);
+    assert_int_equal(atomic_load(&wakes), 0);
+    job_view_clear(&now);
+    room_end(&room);
+}
+
+TEST(only_so_many_bytes_of_scenes_wait) {
+    enum { MOST = 20 };
+    Room room = room_make(1);
+    Job *jobs[MOST + 1] = {NULL}, *found;
+    char text[1024];
+    Status status = STATUS_OK;
+    size_t count = 0;
+    room_close(&room);
+    room.settings.queue_bytes = 4000;
+    room_open(&room);
+    for (; status == STATUS_OK; count += status == STATUS_OK) {
+        assert_in_range(count, 0, MOST);
+        scene_text(text, 0.01 + 1e-4 * (double)count, 20000, "sponge");
+        status = submit_text(room.manager, text, &jobs[count], &problem);
+    }
+    assert_int_equal(status, STATUS_BUSY);
+    assert_non_null(strstr(problem.detail, "bytes of scenes wait, 4000 are allowed"));
+    assert_in_range(count, 2, MOST);
+    JobView last = show(jobs[count - 1]);
+    assert_int_equal(jobs_cancel(room.manager, last.row.id, &found, NULL), STATUS_OK);
+    job_unref(found);
+    job_view_clear(&last);
+    assert_int_equal(submit_text(room.manager, text, &jobs[count], &problem), STATUS_OK);
+    jobs_stop(room.manager);
+    for (size_t i = 0; i <= count; i++)
+        job_unref(jobs[i]);
+    room_end(&room);
+}
+
+TEST(who_is_refused_waits_for_the_end_of_a_study) {
+    Room room = room_make(1);
+    char text[1024];
+    Job *job = NULL;
+    scene_text(text, 0.015, 1000, "sponge");
+    snprintf(strrchr(text, '}'), 200,
+             ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+             "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.02, \"count\": 1000}]}}");
+    const Submission submission = {.text = text, .size = strlen(text)};
+    room_close(&room);
+    room.settings.study_seconds = 0;
+    room_open(&room);
+    assert_int_equal(jobs_submit(room.manager, &submission, &job, &problem), STATUS_OK);
+    pthread_mutex_lock(&room.manager->lock);
+    while (room.manager->studies == NULL) {
+        pthread_mutex_unlock(&room.manager->lock);
+        nanosleep(&moment, NULL);
+        pthread_mutex_lock(&room.manager->lock);
+    }
+    pthread_mutex_unlock(&room.manager->lock);
+    // Once there is some progress: a turn of it alone is over in a moment.
+    int seconds = 1;
+    for (int i = 0; i < 60000 && seconds < 5; i++, nanosleep(&moment, NULL))
+        seconds = jobs_retry_after(room.manager, NULL, STATUS_BUSY);
+    assert_in_range(seconds, 5, 3600);
+    jobs_stop(room.manager);
+    job_unref(job);
+    room_end(&room);
+}
+
 static size_t count_rows(Room *room) {
     JobRows rows;
     const JobSearch all = job_search_all(100);

@@ -207,6 +207,35 @@ TEST(unknown_names_are_suggested_for_a_few_and_looked_up_for_a_hundred) {
     }
 }
 
+TEST(faults_of_a_scene_with_a_study_beyond_a_hundred_are_counted) {
+    enum { DAMPERS = 30, FAULTS_EACH = 4 };
+    static const char *const endings[] = {
+        "", ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/structure/mass\", "
+            "\"values\": [1, 2]}]}"};
+    for (size_t k = 0; k < COUNT(endings); k++) {
+        char text[DAMPERS * 100 + 512];
+        StudyRequest inquiry;
+        Warnings warnings = {NULL, 0};
+        int size = snprintf(text, sizeof text,
+                            "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"duration\": "
+                            "1, \"sample_rate\": 100, \"excitation\": {\"kind\": \"free\", "
+                            "\"displacement\": 0.1}%s, \"dampers\": [",
+                            endings[k]);
+        for (int i = 0; i < DAMPERS; i++)
+            size += snprintf(text + size, sizeof text - (size_t)size,
+                             "{\"mass\": -1, \"clearance\": -1, \"buffer\": {\"restitution\": "
+                             "2, \"contact_time\": -1}}, ");
+        snprintf(text + size - 2, sizeof text - (size_t)size, "]}");
+        problem_clear(&problem);
+        assert_int_equal(jobs_prepare(db, text, strlen(text), NULL, &inquiry, &warnings, &problem),
+                         STATUS_INVALID);
+        assert_int_equal(problem.count, DAMPERS * FAULTS_EACH);
+        assert_non_null(strstr(problem.faults[99].pointer, "/dampers/24/"));
+        study_request_clear(&inquiry);
+        warnings_clear(&warnings);
+    }
+}
+
 TEST(faults_stand_where_the_name_or_the_digest_does) {
     static const char axis[] =
         "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/name\", \"values\": %s}]%s}";

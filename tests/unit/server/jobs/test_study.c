@@ -145,6 +145,37 @@ static int64_t process_cpu_ns(void) {
 }
 
 // Dismisses a study whose members are long, in the midst of them: the CPU that it takes afterwards.
+static bool stop_at_a_third(void *context, double fraction) {
+    size_t *calls = context;
+    ++*calls;
+    return fraction < 1.0 / 3;
+}
+
+TEST(a_study_on_threads_stops_when_its_watch_does) {
+    char text[1024];
+    Db *db;
+    StudyRequest request;
+    Warnings warnings = {NULL, 0};
+    Variant *answer = NULL;
+    size_t calls = 0;
+    const SimulationLimits limits = {.samples = 1 << 20, .impacts = 1 << 20};
+    const Progress watch = {&calls, stop_at_a_third};
+    problem_clear(&problem);
+    ensemble(text, 100, 2);
+    assert_int_equal(db_open(NULL, &db, &problem), STATUS_OK);
+    assert_int_equal(jobs_prepare(db, text, strlen(text), &limits, &request, &warnings, &problem),
+                     STATUS_OK);
+    assert_int_equal(
+        jobs_run_study(request.study, &request.simulation, &limits, &watch, &answer, &problem),
+        STATUS_CANCELLED);
+    assert_null(answer);
+    assert_string_equal(problem.detail, "the study was stopped");
+    assert_true(calls > 1);
+    study_request_clear(&request);
+    warnings_clear(&warnings);
+    db_close(db);
+}
+
 TEST(a_study_stops_within_100_ms_of_work) {
     static const char sweep[] =
         "{\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/excitation/seed\","
