@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -25,13 +26,9 @@ typedef struct ChunkMaking {
     Bytes bytes;
 } ChunkMaking;
 
-static volatile sig_atomic_t chunk_child; // 0: none
-
 // The scheduler wants the processor back: another task makes the chunk anew.
 static void chunk_stop(int signal) {
     (void)signal;
-    if (chunk_child > 0)
-        (void)kill((pid_t)chunk_child, SIGKILL);
     _exit(CHUNK_AGAIN);
 }
 
@@ -103,16 +100,15 @@ static bool chunk_run_child(ChunkMaking *making) {
     }
     if (child == 0) {
         (void)signal(SIGTERM, SIG_DFL);
+        (void)prctl(PR_SET_PDEATHSIG, SIGKILL); // it ends with its parent
         (void)fclose(in);
         _exit(chunk_make_members(making, out) ? 0 : 1);
     }
-    chunk_child = (sig_atomic_t)child;
     (void)fclose(out);
     chunk_take_members(making, in);
     (void)fclose(in);
     while (waitpid(child, &state, 0) < 0 && errno == EINTR)
         ;
-    chunk_child = 0;
     if (making->bytes.is_failed)
         fprintf(stderr, "impactd chunk: no memory for a chunk\n");
     const bool is_crash = WIFSIGNALED(state) && signal_is_crash(WTERMSIG(state));

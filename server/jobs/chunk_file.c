@@ -195,36 +195,27 @@ static Status plan_read(const char *folder, ChunkPlan *plan, ChunkKey *key, Prob
     return status == STATUS_OK ? fields_validate(plan_fields, plan, "", problem) : status;
 }
 
-static bool plan_is_of(const ChunkPlan *plan, const ChunkPlan *other) {
-    return strcmp(plan->engine, other->engine) == 0 && strcmp(plan->scene, other->scene) == 0 &&
-           plan->members == other->members && plan->is_strided == other->is_strided &&
-           (!plan->is_made || plan->chunks == other->chunks) &&
-           memcmp(&plan->limits, &other->limits, sizeof plan->limits) == 0;
-}
-
 Status chunk_folder_make(const char *folder, ChunkPlan *plan, ChunkKey *key, Problem *problem) {
     static const char *const parts[] = {"", "/chunks", "/log"};
     char path[PATH_MAX];
     Bytes text = {0};
     ChunkPlan stored;
+    ChunkKey there = {{0}};
     for (size_t i = 0; i < COUNT(parts); i++) {
         snprintf(path, sizeof path, "%.3000s%s", folder, parts[i]);
         if (mkdir(path, 0700) != 0 && errno != EEXIST)
             return file_fault(problem, path, "made");
     }
-    const bool is_there =
-        plan_read(folder, &stored, key, NULL) == STATUS_OK && plan_is_of(plan, &stored);
-    if (is_there)
+    if (plan_read(folder, &stored, &there, NULL) == STATUS_OK && !plan->is_made &&
+        stored.members == plan->members && stored.chunks <= plan->members)
         plan->chunks = stored.chunks;
     chunk_plan_clear(&stored);
     plan->is_made = true;
-    if (is_there)
-        return STATUS_OK;
     encode_item(&text, plan_fields, plan, WRITE_SCENE);
     sha256_sum(text.at, text.count, key->digest);
-    const Status status = text.is_failed
-                              ? study_result(STATUS_NO_MEMORY, problem)
-                              : chunk_folder_put(folder, "study", text.at, text.count, problem);
+    Status status = study_result(status_made(!text.is_failed), problem);
+    if (status == STATUS_OK && memcmp(key, &there, sizeof there) != 0)
+        status = chunk_folder_put(folder, "study", text.at, text.count, problem);
     bytes_clear(&text);
     return status;
 }

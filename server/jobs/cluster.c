@@ -149,18 +149,6 @@ static Status study_write(ClusterStudy *study, Problem *problem) {
     return status;
 }
 
-static Status study_plan(ClusterStudy *study, size_t slots, Problem *problem) {
-    StudyRun *run = study->run;
-    ChunkPlan *plan = &study->plan;
-    TRY(chunk_plan_make(plan, &run->task->inquiry, run->manager->db, &run->manager->settings.limits,
-                        problem));
-    plan->members = run->work->members;
-    plan->is_strided = plan->is_made = run->is_sweep;
-    plan->chunks =
-        run->is_sweep ? run->sweep.chunks : study_count_chunks(run, run->work->members, slots);
-    return study_write(study, problem);
-}
-
 Status cluster_prepare(StudyRun *run, size_t slots, Problem *problem) {
     Cluster *cluster = run->manager->cluster;
     ClusterStudy *study = run->cluster = calloc(1, sizeof *study);
@@ -176,17 +164,23 @@ Status cluster_prepare(StudyRun *run, size_t slots, Problem *problem) {
              cluster->id, (unsigned long long)run->sweep.retries);
     snprintf(study->folder, sizeof study->folder, "%.3000s/%s", cluster->settings->shared,
              study->name);
-    TRY(study_plan(study, slots, problem));
-    study->chunks = calloc((size_t)study->plan.chunks, sizeof *study->chunks);
+    ChunkPlan *plan = &study->plan;
+    TRY(chunk_plan_make(plan, &run->task->inquiry, run->manager->db, &run->manager->settings.limits,
+                        problem));
+    plan->members = run->work->members;
+    plan->is_strided = plan->is_made = run->is_sweep;
+    plan->chunks = run->is_sweep ? run->sweep.chunks : study_count_chunks(run, slots);
+    TRY(study_write(study, problem));
+    study->chunks = calloc((size_t)plan->chunks, sizeof *study->chunks);
     if (study->chunks == NULL)
         return study_result(STATUS_NO_MEMORY, problem);
     for (SweepChunk *rows; (rows = run->chunks) != NULL; run->chunks = rows->next)
         study->chunks[rows->row.chunk].rows = rows;
-    study->run->view.chunks = study->plan.chunks;
-    for (size_t i = 0; run->is_sweep && i < study->plan.chunks; i++)
+    run->view.chunks = plan->chunks;
+    for (size_t i = 0; run->is_sweep && i < plan->chunks; i++)
         if (study->chunks[i].rows == NULL) { // the database has them
             study->chunks[i].state = CHUNK_DONE;
-            study->run->view.done++;
+            run->view.done++;
         }
     return STATUS_OK;
 }
@@ -437,28 +431,27 @@ static void chunk_ended(ClusterStudy *study, size_t chunk, Problem *problem) {
 }
 
 // The chunks whose tasks ended without a file. The folder may show it late, so this is judged when
-// Slurm is asked the next time. Without space Slurm cannot even begin a task. Returns whether there
-// are none; *status is that of the folder.
-static bool study_find_lost(ClusterStudy *study, Status *status, Problem *problem) {
-    bool is_probed = false, has_none = true;
+// Slurm is asked the next time. Without space Slurm cannot even begin a task.
+static Status study_find_lost(ClusterStudy *study, Problem *problem) {
+    Status status = STATUS_OK;
+    bool is_probed = false;
     for (size_t i = study->first; i < study->plan.chunks; i++) {
         ClusterChunk *chunk = &study->chunks[i];
         if (chunk->state != CHUNK_SUBMITTED || chunk->is_live || chunk->has_file)
             continue;
-        has_none = false;
         if (!chunk->was_missing) {
             chunk->was_missing = true;
             continue;
         }
         if (!is_probed) {
-            *status = study_probe(study, problem);
+            status = study_probe(study, problem);
             (void)study_look(study, NULL);
         }
         is_probed = true;
         if (!chunk->has_file)
             chunk_ended(study, i, problem);
     }
-    return has_none;
+    return status;
 }
 
 static Status study_apply_tasks(ClusterStudy *study, const SlurmTasks *tasks, Problem *problem) {
@@ -489,9 +482,10 @@ static Status study_apply_tasks(ClusterStudy *study, const SlurmTasks *tasks, Pr
             waits = task;
     }
     Status status = study_look(study, problem);
+    if (status == STATUS_OK)
+        status = study_find_lost(study, problem);
     const size_t queued = counts[SLURM_QUEUED], running = counts[SLURM_RUNNING];
-    const bool is_same = status == STATUS_OK && study_find_lost(study, &status, problem) &&
-                         view->queued == queued && view->running == running;
+    const bool is_same = view->queued == queued && view->running == running;
     const SlurmFacts facts = cluster_facts(study->cluster);
     pthread_mutex_lock(&study->cluster->manager->lock);
     view->queued = queued;

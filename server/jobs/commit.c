@@ -58,9 +58,7 @@ Status run_result_add_to_study(RunResult *run_result, Problem *problem) {
     encode_item(&study, study_answer_fields, &run_result->answer, WRITE_SCENE);
     run_result->result.study = bytes_take(&study, NULL);
     run_result->result.created_unix_ms = clock_unix_ms();
-    return run_result->result.study != NULL
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the study's document");
+    return study_result(status_made(run_result->result.study != NULL), problem);
 }
 
 // With the lock held: the jobs that wait, in their last state. One whose insertion is under way

@@ -9,9 +9,8 @@
 
 typedef struct JobManager JobManager;
 
-enum {
-    DOCUMENT_BYTES = 900000000
-}; // of one document or outcome; a value of SQLite has at most a billion
+// Of one document or outcome; a value of SQLite has at most a billion.
+enum { DOCUMENT_BYTES = 900000000 };
 
 // Where studies of at least `seconds` of predicted CPU time are made: by Slurm, with the files of
 // `shared`.

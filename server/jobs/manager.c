@@ -126,10 +126,10 @@ Status jobs_open(Db *db, const JobManagerSettings *settings, JobManager **opened
     manager->tasks = hashmap_new();
     manager->cache = lru_new(settings->cache_bytes, cache_release, manager);
     manager->workers = calloc(settings->workers + 1, sizeof *manager->workers);
-    Status status = STATUS_OK;
-    if (manager->jobs == NULL || manager->tasks == NULL || manager->cache == NULL ||
-        manager->queue == NULL || manager->workers == NULL)
-        status = problem_set(problem, STATUS_NO_MEMORY, "no memory for the job queue");
+    const bool is_made = manager->jobs != NULL && manager->tasks != NULL &&
+                         manager->cache != NULL && manager->queue != NULL &&
+                         manager->workers != NULL;
+    Status status = study_result(status_made(is_made), problem);
     if (status == STATUS_OK)
         status = db_sweep_tidy(db, problem);
     if (status == STATUS_OK)

@@ -425,8 +425,7 @@ static Status resolve_record(Db *db, const StudyRequest *request, Problem *probl
                     &named, problem));
     const bool is_resolved = record_resolve(record, named);
     refcount_unref(&named->shared);
-    return is_resolved ? STATUS_OK
-                       : problem_set(problem, STATUS_NO_MEMORY, "no memory for a scene");
+    return study_result(status_made(is_resolved), problem);
 }
 
 // A record that a study keeps, at `place`; likewise. Without a digest it may be a name alone.
@@ -438,9 +437,7 @@ static Status resolve_kept_record(Db *db, PinnedRecord *kept, const char *place,
                     kept->digest == NULL ? place : json_pointer_of(place, "name").at,
                     json_pointer_of(place, "digest").at, &named, problem));
     kept->named = &named->shared;
-    return kept->digest != NULL || (kept->digest = strdup(named->digest)) != NULL
-               ? STATUS_OK
-               : STATUS_NO_MEMORY;
+    return status_made(kept->digest != NULL || (kept->digest = strdup(named->digest)) != NULL);
 }
 
 // The names in a study: of the materials and records that came with it, those of its scene, and

@@ -25,11 +25,10 @@ static Status slurm_run(Bytes *text, Problem *problem) {
     *text = (Bytes){.most = OUTPUT_BYTES};
     for (size_t i = 0; i < ARGUMENTS && (words[i] = strsep(&rest, "\n")) != NULL; i++)
         ;
-    Status status = STATUS_NO_MEMORY;
-    if (!command.is_failed && bytes_reserve(text, 0)) // a text also where nothing is printed
-        status = process_run(words, patience, text, problem);
-    else
-        (void)problem_set(problem, status, "no memory for Slurm");
+    const bool has_memory = !command.is_failed && bytes_reserve(text, 0); // also for an empty text
+    const Status status = has_memory
+                              ? process_run(words, patience, text, problem)
+                              : problem_set(problem, STATUS_NO_MEMORY, "no memory for Slurm");
     bytes_clear(&command);
     return status;
 }

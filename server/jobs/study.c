@@ -198,8 +198,8 @@ static bool study_is_over(StudyRun *run) {
     return atomic_load(&run->engine.is_over) || atomic_load(&run->task->is_stopped);
 }
 
-size_t study_count_chunks(const StudyRun *run, size_t members, size_t slots) {
-    const double all = (double)members;
+size_t study_count_chunks(const StudyRun *run, size_t slots) {
+    const double all = (double)run->work->members;
     const double each = run->is_clustered ? cluster_chunk_seconds : chunk_seconds;
     double chunks = fmin(ceil(run->task->queued.seconds / each), CHUNKS_MAX);
     chunks = fmax(chunks, ceil(all / CHUNK_ROWS));
@@ -229,7 +229,7 @@ static Status sweep_begin(StudyRun *run, size_t slots, Problem *problem) {
             return study_result(STATUS_NO_MEMORY, problem);
         row->metrics = metrics;
         row->points = points;
-        row->chunks = study_count_chunks(run, (size_t)points, slots);
+        row->chunks = study_count_chunks(run, slots);
         row->created_unix_ms = clock_unix_ms();
     }
     // Also a row that is there: it may be about to be deleted with the last job before this one.
@@ -673,10 +673,8 @@ void study_work(Worker *worker, const StudyTurn *turn, Problem *problem) {
         run->chunks = turn->chunk;
     }
     study_enqueue(run);
-    const bool is_end = study_release(run);
     pthread_mutex_unlock(&manager->lock);
-    if (is_end)
-        study_finish(worker, run, problem);
+    study_leave(worker, run, problem);
 }
 
 // A study on threads of this process alone.
@@ -751,8 +749,8 @@ static Status study_threads_run(StudyWork *work, const StudyTools *tools, Proble
     return status;
 }
 
-static double study_engine_cpu(void *context) {
-    (void)context;
+double study_cpu(void *unused) {
+    (void)unused;
     return 1e-9 * (double)clock_thread_cpu_ns();
 }
 
@@ -762,7 +760,7 @@ Status jobs_run_study(const Variant *study, const Simulation *simulation,
     Workspace workspace = {0};
     StudyWork *work;
     const StudyTools tools = {
-        .limits = limits, .progress = watch, .workspace = &workspace, .cpu = study_engine_cpu};
+        .limits = limits, .progress = watch, .workspace = &workspace, .cpu = study_cpu};
     // A study without members is made by this thread in study_begin.
     Status status = study_begin(study, simulation, &tools, answer, &work, problem);
     if (status == STATUS_OK && study_has_members(study))

@@ -89,11 +89,12 @@ typedef struct StudyTurn {
 // The caller has a turn of it then, which study_leave ends.
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem);
 void study_leave(Worker *worker, StudyRun *run, Problem *problem);
+double study_cpu(void *unused); // seconds of CPU of this thread, for StudyTools
 // Makes members or ends the study. Both may be freed afterwards.
 void study_work(Worker *worker, const StudyTurn *turn, Problem *problem);
 void study_run_free(StudyRun *run); // NULL is fine
 // How many chunks its members are made in, by their predicted cost and what runs at once.
-size_t study_count_chunks(const StudyRun *run, size_t members, size_t slots);
+size_t study_count_chunks(const StudyRun *run, size_t slots);
 // Ends the study as failed, once its turns are over.
 void study_run_fail(StudyRun *run, Status status, Problem *problem);
 

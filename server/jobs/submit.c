@@ -33,10 +33,6 @@ typedef struct Entry {
     Job *earlier; // of the same key; a reference
 } Entry;
 
-static Status submit_no_memory(Problem *problem) {
-    return problem_set(problem, STATUS_NO_MEMORY, "no memory for a job");
-}
-
 static Status key_read(const Submission *submission, Entry *entry, Problem *problem) {
     const char *text = submission->idempotency_key;
     if (text == NULL)
@@ -57,7 +53,7 @@ static Status key_read(const Submission *submission, Entry *entry, Problem *prob
     memcpy(entry->key, text, size);
     Sha256 *digest = sha256_new();
     if (digest == NULL)
-        return submit_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     if (submission->retry_of != NULL) {
         sha256_add(digest, "retry ", 6);
         sha256_add(digest, submission->retry_of, strlen(submission->retry_of));
@@ -106,7 +102,7 @@ static Status client_enter(JobManager *manager, const char *name, QueueClient **
     pthread_mutex_lock(&manager->lock);
     QueueClient *client = *entered = queue_client(manager->queue, name != NULL ? name : "");
     if (client == NULL) {
-        status = submit_no_memory(problem);
+        status = study_result(STATUS_NO_MEMORY, problem);
     } else if (manager->settings.rate > 0 && name != NULL) {
         const double left = client_allowance(manager, client);
         if (left < 1) {
@@ -312,7 +308,7 @@ static Status submit_queue(Entry *entry, Problem *problem) {
     const bool is_retry = entry->submission->retry_of != NULL; // computed even if it is cached
     Task *task = submit_make_task(manager, &job->row, &entry->request);
     if (task == NULL)
-        return submit_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     bool is_queued = false, is_cached = false;
     pthread_mutex_lock(&manager->lock);
     // It may have been saved meanwhile.
@@ -403,7 +399,7 @@ static Status submit_fill(const Entry *entry, const Warnings *warnings, Problem 
         text_copy(has_key ? entry->key : NULL, &row->idempotency_key),
         text_copy(has_key ? entry->digest : NULL, &row->request),
         jobs_result_id(request, row->result, NULL)};
-    return status_first(all, COUNT(all)) == STATUS_OK ? STATUS_OK : submit_no_memory(problem);
+    return study_result(status_first(all, COUNT(all)), problem);
 }
 
 // Takes the text, "" as NULL, in place of the row's.
@@ -429,7 +425,7 @@ Status jobs_annotate(JobManager *manager, const char *id, const char *title, con
     }
     if (status == STATUS_OK &&
         (shown.is_failed || array.is_failed || title_words.is_failed || label_words.is_failed))
-        status = submit_no_memory(problem);
+        status = study_result(STATUS_NO_MEMORY, problem);
     // The labels' words begin with the line of the title.
     const JobNotes notes = {.id = id,
                             .title = title,
@@ -466,7 +462,7 @@ static Status submit_scene(Entry *entry, const char *text, size_t size, Problem 
     TRY(client_enter(manager, entry->submission->client, &client, problem));
     Job *job = entry->job = job_new(manager);
     if (job == NULL)
-        return submit_no_memory(problem);
+        return study_result(STATUS_NO_MEMORY, problem);
     job->submitted_ns = clock_monotonic_ns();
     job->client = client;
     Warnings warnings = {NULL, 0};

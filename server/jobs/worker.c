@@ -27,14 +27,7 @@ static Status worker_describe(const Task *task, RunResult *run_result, Problem *
         text_copy(task->warnings, &row->warnings),
         status_made((row->uses = bytes_take(&uses, NULL)) != NULL),
         status_made((row->outcome.at = bytes_take(&blob, &row->outcome.size)) != NULL)};
-    return status_first(all, COUNT(all)) == STATUS_OK
-               ? STATUS_OK
-               : problem_set(problem, STATUS_NO_MEMORY, "no memory for the result's documents");
-}
-
-static double worker_cpu(void *context) {
-    (void)context;
-    return 1e-9 * (double)clock_thread_cpu_ns();
+    return study_result(status_first(all, COUNT(all)), problem);
 }
 
 // A study without members measures CPU times: it is made on one thread.
@@ -45,7 +38,7 @@ static Status worker_run_study(Worker *worker, Task *task, RunResult *run_result
     const StudyTools tools = {.limits = &worker->manager->settings.limits,
                               .progress = &watch,
                               .workspace = &worker->workspace,
-                              .cpu = worker_cpu};
+                              .cpu = study_cpu};
     return study_run(task->inquiry.study, &task->inquiry.simulation, &tools,
                      &run_result->answer.study, problem);
 }

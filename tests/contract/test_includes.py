@@ -25,7 +25,7 @@ PURE = set("assert complex ctype errno float immintrin inttypes limits math stda
            "stddef stdint stdio stdlib string".split())
 SYSTEM = PURE | set("dirent fcntl ftw grp libgen locale netdb poll pthread pwd sched semaphore signal spawn strings "
                     "termios time unistd arpa/inet net/if netinet/in netinet/tcp sys/epoll sys/eventfd "
-                    "sys/file sys/ioctl sys/mman sys/random sys/resource sys/select sys/socket sys/stat "
+                    "sys/file sys/ioctl sys/mman sys/prctl sys/random sys/resource sys/select sys/socket sys/stat "
                     "sys/statvfs sys/time sys/types sys/un sys/wait wctype".split())
 
 MHD_FILES = [f"server/http/{name}" for name in ("event_loop.c", "connection.c", "connection.h")]
