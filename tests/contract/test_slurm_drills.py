@@ -3,6 +3,7 @@
 After each nothing is lost, twice or wrong: the answer is to the byte that of threads, no task is queued, no file is left."""
 
 import contextlib
+import getpass
 import hashlib
 import os
 import shutil
@@ -191,7 +192,7 @@ def test_a_controller_that_is_away():
             # After kill -9 Slurm finds "Duplicate jobid" and drains nodes, which is for administrators to mend.
             until(lambda: at.document()["status"] == "successful" or at.slurm.resume() or time.sleep(1), at.cluster)
             if how == signal.SIGKILL:  # Slurm may also forget that a task was cancelled
-                until(lambda: not at.slurm.tasks() or at.slurm.call("scancel", f"--name={at.name()}"), at.slurm.tasks)
+                until(lambda: not at.slurm.tasks() or at.slurm.call("scancel", f"--user={getpass.getuser()}"), at.slurm.tasks)
             at.ends_well()
 
 

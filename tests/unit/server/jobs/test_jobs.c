@@ -438,7 +438,7 @@ TEST(who_is_refused_waits_for_the_end_of_a_study) {
     scene_text(text, 0.015, 1000, "sponge");
     snprintf(strrchr(text, '}'), 200,
              ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
-             "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.02, \"count\": 1000}]}}");
+             "\"/dampers/0/clearance\", \"from\": 0.01, \"to\": 0.02, \"count\": 100000}]}}");
     const Submission submission = {.text = text, .size = strlen(text)};
     room_close(&room);
     room.settings.study_seconds = 0;
@@ -459,6 +459,50 @@ TEST(who_is_refused_waits_for_the_end_of_a_study) {
     jobs_stop(room.manager);
     job_unref(job);
     room_end(&room);
+}
+
+TEST(only_the_failed_points_of_a_sweep_are_made_again) {
+    Room room = room_make(1);
+    Job *job = submit(&room, 0.015, 1), *again = NULL;
+    wait_for(job);
+    JobView now = show(job);
+    Submission submission = {.retry_of = "j-0000000000000000"};
+    assert_int_equal(jobs_submit(room.manager, &submission, &again, &problem), STATUS_NOT_FOUND);
+    assert_null(again);
+    submission.retry_of = now.row.id; // without a sweep
+    problem_clear(&problem);
+    assert_int_equal(jobs_submit(room.manager, &submission, &again, &problem), STATUS_NOT_FOUND);
+    assert_non_null(strstr(problem.detail, "sweep"));
+    assert_null(again);
+    job_view_clear(&now);
+    room_close_jobs(&room, job);
+    scratch_remove(room.directory);
+}
+
+TEST(labels_and_title_of_a_live_job_are_set_each_alone) {
+    Room room = room_make(1);
+    Job *job = submit(&room, 0.015, 20000);
+    JobView now = show(job);
+    char *names[] = {(char *)"one", (char *)"two"};
+    const Texts labels = {names, 2}, none = {NULL, 0};
+    char id[40];
+    memcpy(id, now.row.id, sizeof id);
+    job_view_clear(&now);
+    static const char *const titles[] = {NULL, "a title", NULL, ""};
+    const Texts *const given[] = {&labels, NULL, &none, NULL};
+    static const char *const shown[][2] = {{NULL, "[\"one\", \"two\"]"},
+                                           {"a title", "[\"one\", \"two\"]"},
+                                           {"a title", NULL},
+                                           {NULL, NULL}};
+    for (size_t i = 0; i < COUNT(titles); i++) {
+        assert_int_equal(jobs_annotate(room.manager, id, titles[i], given[i], &problem), STATUS_OK);
+        now = show(job);
+        assert_true(text_same(now.row.title, shown[i][0]));
+        assert_true(text_same(now.row.labels, shown[i][1]));
+        job_view_clear(&now);
+    }
+    room_close_jobs(&room, job);
+    scratch_remove(room.directory);
 }
 
 static size_t count_rows(Room *room) {

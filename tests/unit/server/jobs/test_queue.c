@@ -128,6 +128,22 @@ TEST(the_kept_worker_takes_quick_ones_alone) {
     queue_free(queue);
 }
 
+TEST(any_of_the_urgent_can_be_removed) {
+    Queue *queue = queue_new();
+    for (size_t gone = 0; gone < 3; gone++) {
+        QueueEntry at[3] = {{.seconds = 9}, {.seconds = 9}, {.seconds = 9}};
+        for (size_t i = 0; i < 3; i++)
+            queue_push_front(queue, &at[i]);
+        queue_remove(queue, &at[gone]);
+        assert_null(queue_take(queue, true)); // none is quick
+        for (size_t i = 0; i < 3; i++)
+            if (i != gone)
+                assert_ptr_equal(queue_take(queue, false), &at[i]);
+        assert_int_equal(queue_count(queue), 0);
+    }
+    queue_free(queue);
+}
+
 TEST(what_others_want_too_moves_to_whoever_waits_less) {
     Queue *queue = queue_new();
     QueueEntry at[20];

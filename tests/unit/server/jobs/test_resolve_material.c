@@ -214,6 +214,15 @@ TEST_IN(a_name_alone_is_the_approved_head_and_never_a_deprecated_one, set_up, te
     assert_string_equal(problem.faults[0].did_you_mean, "foam@2");
     assert_int_equal(prepare("\"buffer\": \"foam@3\"", ""), STATUS_INVALID);
     expect_fault("/dampers/0/buffer", "has no such revision; its newest revision is foam@2");
+    assert_int_equal(prepare("\"buffer\": \"sponge@9\"", ""), STATUS_INVALID);
+    expect_fault("/dampers/0/buffer", "has no such revision; its head is sponge@1");
+    static const char *const wrong[] = {"@1", "foam@1234567890", "foam@0", "foam@1x"};
+    for (size_t i = 0; i < COUNT(wrong); i++) {
+        char buffer[80];
+        snprintf(buffer, sizeof buffer, "\"buffer\": \"%s\"", wrong[i]);
+        assert_int_equal(prepare(buffer, ""), STATUS_INVALID);
+        expect_fault("/dampers/0/buffer", "no material is called");
+    }
 }
 
 // As they were before any material had more than one revision.

@@ -224,6 +224,32 @@ TEST(an_ensemble_is_dismissed_at_any_moment_and_leaves_nothing) {
     room_end(&room);
 }
 
+// One worker has turns of both: the other one stands in the queue, and no worker is at it.
+TEST(a_study_that_waits_for_its_turn_is_dismissed) {
+    Room room = room_make(1);
+    char text[1024], ids[2][40];
+    for (int i = 0; i < 10; i++) {
+        for (int k = 0; k < 2; k++) {
+            ensemble(text, 5000, 20 + 2 * i + k);
+            room_submit(&room, text, k == 0 ? "one" : "two", ids[k]);
+        }
+        pthread_mutex_lock(&room.manager->lock);
+        while (room.manager->studies == NULL || room.manager->studies->next == NULL) {
+            pthread_mutex_unlock(&room.manager->lock);
+            room_nap(1000000);
+            pthread_mutex_lock(&room.manager->lock);
+        }
+        pthread_mutex_unlock(&room.manager->lock);
+        room_nap(1000000L * i);
+        room_dismiss(&room, ids[i % 2]);
+        room_dismiss(&room, ids[1 - i % 2]);
+        while (!is_idle(&room))
+            room_nap(1000000);
+        assert_true(room.manager->memory == 0 && room.manager->studies == NULL);
+    }
+    room_end(&room);
+}
+
 TEST(an_ensemble_that_was_interrupted_begins_again) {
     Room room = room_make(2);
     char text[1024], id[40], result[72];

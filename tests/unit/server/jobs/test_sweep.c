@@ -3,6 +3,8 @@
 #include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "server/jobs/jobs_private.h"
@@ -91,6 +93,68 @@ TEST(a_sweep_waits_for_a_disk_whose_faults_pass) {
         assert_whole(&room, result, 300);
         room_end(&room);
     }
+}
+
+enum { OF_EACH = 60 }; // points that are made, and that fail
+
+// Points with their rows and reasons; those that fail are what their scenes fail of by themselves.
+static void assert_failed(const Room *room, const char *result) {
+    SweepView view;
+    Workspace workspace = {0};
+    Problem problem;
+    assert_int_equal(sweep_view_load(room->db, result, false, true, &view, NULL), STATUS_OK);
+    assert_true(view.is_complete && view.row.chunks < OF_EACH / 2); // some rows of a chunk fail
+    assert_int_equal(view.sweep->table.failed, OF_EACH);
+    assert_int_equal(view.sweep->table.failures.count, 1);
+    assert_int_equal(view.sweep->table.failures.at[0].count, OF_EACH);
+    for (size_t i = 0; i < 2 * OF_EACH; i++) {
+        SweepPoint point;
+        Outcome *outcome;
+        assert_int_equal(sweep_point_load(&view, i, &point, NULL), STATUS_OK);
+        problem_clear(&problem);
+        const Status status =
+            simulation_run(&point.scene.simulation, NULL, NULL, &workspace, &outcome, &problem);
+        assert_int_equal(point.status == SWEEP_MADE, i < OF_EACH);
+        assert_int_equal(status == STATUS_OK, i < OF_EACH);
+        if (i < OF_EACH)
+            assert_string_equal(point.why, "");
+        else
+            assert_true(point.why[0] != '\0' &&
+                        strncmp(point.why, problem.detail, strlen(point.why)) == 0);
+        outcome_unref(outcome);
+        study_request_clear(&point.scene);
+    }
+    workspace_clear(&workspace);
+    sweep_view_clear(&view);
+}
+
+TEST(many_points_of_a_chunk_fail_each_with_its_reason_also_when_they_are_made_again) {
+    Room room = room_make(2);
+    char text[1024], id[40], result[72];
+    Job *again;
+    JobView view;
+    Problem problem;
+    snprintf(text, sizeof text,
+             "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865, \"damping\": 1.092}, "
+             "\"dampers\": [{\"mass\": 0.1107, \"clearance\": 0.015, \"buffer\": \"sponge\"}], "
+             "\"excitation\": {\"kind\": \"free\", \"displacement\": 0.03}, \"duration\": 2, "
+             "\"sample_rate\": 100, \"accuracy\": {\"solver\": \"rk4\", \"step\": 1e-3}, "
+             "\"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": \"/dampers/0/buffer\", "
+             "\"values\": [\"sponge\", \"aluminium\"]}, {\"pointer\": \"/dampers/0/clearance\", "
+             "\"from\": 0.005, \"to\": 0.01, \"count\": %d}]}}",
+             OF_EACH);
+    room_submit(&room, text, NULL, id);
+    room_finish(&room, id, result);
+    assert_failed(&room, result);
+    const Submission retry = {.retry_of = id};
+    problem_clear(&problem);
+    assert_int_equal(jobs_submit(room.manager, &retry, &again, &problem), STATUS_OK);
+    assert_int_equal(job_view(again, &view), STATUS_OK);
+    room_finish(&room, view.row.id, result);
+    job_view_clear(&view);
+    job_unref(again);
+    assert_failed(&room, result);
+    room_end(&room);
 }
 
 // For the thread sanitizer.
