@@ -28,7 +28,8 @@ static const double copy_share = 0.8; // of the time; the check takes the rest
 
 typedef struct Copying {
     const BackupRequest *request;
-    char source[PATH_MAX], target[PATH_MAX];
+    const char *source, *target; // one of them is `own`, the server's database
+    char own[PATH_MAX];
     char folder[PATH_MAX]; // of the target
     char part[PATH_MAX];   // the target's name until it is whole; "": there is none
     int file;              // the part
@@ -72,16 +73,15 @@ static Status check_target(const Copying *copying, Problem *problem) {
 }
 
 static Status open_part(Copying *copying, Problem *problem) {
-    const int size =
-        snprintf(copying->part, sizeof copying->part, "%.4080s.XXXXXX", copying->target);
-    if ((size_t)size >= sizeof copying->part - 8)
-        return problem_set(problem, STATUS_IO, "%.200s...: the name is too long", copying->target);
-    copying->file = mkstemp(copying->part); // for this user alone: it has the tokens' digests
+    const int size = snprintf(copying->part, sizeof copying->part, "%s.XXXXXX", copying->target);
+    // For this user alone: it has the tokens' digests.
+    copying->file = (size_t)size < sizeof copying->part ? mkstemp(copying->part) : -1;
     if (copying->file >= 0)
         return sqlite_open(copying->part, DATABASE_COPY, &copying->copy, problem);
+    const int code = (size_t)size < sizeof copying->part ? errno : ENAMETOOLONG;
     copying->part[0] = '\0';
-    return problem_set(problem, errno == EACCES || errno == EPERM ? STATUS_FORBIDDEN : STATUS_IO,
-                       "%s cannot be written: %s", copying->target, strerror(errno));
+    return problem_set(problem, code == EACCES || code == EPERM ? STATUS_FORBIDDEN : STATUS_IO,
+                       "%.400s cannot be written: %s", copying->target, strerror(code));
 }
 
 static void copy_keep_damage(void *context, const char *damage) {
@@ -133,11 +133,11 @@ static Status sync_part(Copying *copying, Problem *problem) {
                : problem_set(problem, STATUS_CANCELLED, "it was interrupted");
 }
 
-// Where the target may not be replaced it is not, also if it was made a moment ago; a file system
-// without links does not notice.
+// Where the target may not be replaced it is not, also if it was made a moment ago; in a file
+// system without links one that is made at this very moment is.
 static Status rename_part(Copying *copying, bool replaces, Problem *problem) {
     const bool is_linked = !replaces && link(copying->part, copying->target) == 0;
-    if (!is_linked && !replaces && errno == EEXIST)
+    if (!is_linked && !replaces && (errno == EEXIST || access(copying->target, F_OK) == 0))
         return refuse_taken(copying, problem);
     if (!is_linked && rename(copying->part, copying->target) != 0)
         return problem_set(problem, STATUS_IO, "%s cannot be written: %s", copying->target,
@@ -171,11 +171,12 @@ static void remove_beside(const char *path, const char *end) {
     }
 }
 
-static Status check_restored_file(const char *path, struct stat *source, Problem *problem) {
-    if (stat(path, source) != 0)
+static Status check_restored_file(const char *path, Problem *problem) {
+    struct stat source;
+    if (stat(path, &source) != 0)
         return problem_set(problem, errno == ENOENT ? STATUS_NOT_FOUND : STATUS_IO,
                            "%s cannot be read: %s", path, strerror(errno));
-    return S_ISREG(source->st_mode)
+    return S_ISREG(source.st_mode)
                ? STATUS_OK
                : problem_set(problem, STATUS_CONFLICT, "%s is not a regular file", path);
 }
@@ -183,8 +184,7 @@ static Status check_restored_file(const char *path, struct stat *source, Problem
 static Status check_restore(const Copying *copying, Problem *problem) {
     const char *directory = copying->request->directory, *path = copying->source;
     struct stat source, target;
-    TRY(check_restored_file(path, &source, problem));
-    if (stat(copying->target, &target) != 0)
+    if (stat(path, &source) != 0 || stat(copying->target, &target) != 0)
         return STATUS_OK;
     if (is_same_file(&source, &target))
         return problem_set(problem, STATUS_CONFLICT,
@@ -237,11 +237,10 @@ static Status backup_copy(const BackupRequest *request, bool is_restore, Backup 
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for a backup");
     copying->request = request;
     copying->file = -1;
-    char *own = is_restore ? copying->target : copying->source;
-    char *other = is_restore ? copying->source : copying->target;
+    copying->source = is_restore ? request->path : copying->own;
+    copying->target = is_restore ? copying->own : request->path;
     const char *slash = strrchr(request->path, '/');
-    snprintf(own, PATH_MAX, "%.4000s/impactd.db", request->directory);
-    snprintf(other, PATH_MAX, "%s", request->path);
+    snprintf(copying->own, sizeof copying->own, "%.4000s/impactd.db", request->directory);
     if (is_restore)
         snprintf(copying->folder, sizeof copying->folder, "%.4000s", request->directory);
     else
@@ -250,14 +249,12 @@ static Status backup_copy(const BackupRequest *request, bool is_restore, Backup 
                  slash == NULL ? "." : request->path);
     Status status = is_restore ? check_restore(copying, problem) : check_target(copying, problem);
     if (status == STATUS_OK && !is_restore)
-        status = check_exists(own, request->directory, problem);
+        status = check_exists(copying->own, request->directory, problem);
     if (status == STATUS_OK)
         status = fill_part(copying, problem);
     sqlite_close(copying->copy);
     if (status == STATUS_OK)
         status = sync_part(copying, problem);
-    if (status == STATUS_OK && !is_restore)
-        status = check_target(copying, problem);
     if (status == STATUS_OK)
         status = is_restore ? replace_restored(copying, problem)
                             : rename_part(copying, request->replaces, problem);
@@ -281,8 +278,7 @@ Status backup_write(const BackupRequest *request, Backup *backup, Problem *probl
 
 Status backup_restore(const BackupRequest *request, Backup *backup, Problem *problem) {
     int lock;
-    struct stat source;
-    TRY(check_restored_file(request->path, &source, problem)); // before a folder is made
+    TRY(check_restored_file(request->path, problem)); // before a folder is made
     TRY(data_dir_lock(request->directory, &lock, problem));
     const Status status = backup_copy(request, true, backup, problem);
     data_dir_unlock(lock);

@@ -184,7 +184,7 @@ const char *material_member_json(Bytes *bytes, const Field *field, const Materia
     const Field alone[] = {*field, FIELD_END};
     bytes->count = 0;
     (void)encode_members(bytes, alone, material, WRITE_REPORT);
-    const char *colon = bytes->is_failed || bytes->at == NULL ? NULL : strstr(bytes->at, ": ");
+    const char *colon = bytes->is_failed ? NULL : strstr(bytes->at, ": ");
     return colon != NULL ? colon + 2 : NULL;
 }
 

@@ -201,14 +201,15 @@ static Status record_read_samples(Db *db, const RecordRow *row, Reals *samples, 
                row->name));
     free(found.name);
     *samples = (Reals){found.samples.at, row->count};
-    if (found.samples.size == row->count * sizeof(double)) {
-        char digest[RECORD_DIGEST_SIZE];
+    char digest[RECORD_DIGEST_SIZE] = "of another number of samples";
+    if (found.samples.size == row->count * sizeof(double))
         record_digest(row->interval, samples, digest);
-        if (strcmp(digest, row->digest) == 0)
-            return STATUS_OK;
-    }
+    if (strcmp(digest, row->digest) == 0)
+        return STATUS_OK;
     free(samples->at);
     *samples = (Reals){NULL, 0};
+    if (digest[0] == '\0')
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for a record");
     return problem_set(
         problem, STATUS_INTERNAL,
         "the record \"%.64s\" is damaged: its samples differ from their digest; put a "

@@ -1,6 +1,7 @@
 // Results with their series, and what of the catalogue results and unfinished jobs were made with.
 // A row is written once, in the same transaction as the jobs that it finishes.
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -43,12 +44,9 @@ Status use_lines_add(Sqlite *database, const char *sql, const char *lines, Probl
     while (lines != NULL && *lines != '\0') {
         const size_t size = strcspn(lines, "\n");
         char name[160];
-        if (size > 0 && size < sizeof name) {
-            memcpy(name, lines, size);
-            name[size] = '\0';
-            TRY(sqlite_change(database, sql, query_key_columns, &(QueryKey){.name = name}, NULL,
-                              problem));
-        }
+        snprintf(name, sizeof name, "%.*s", (int)size, lines);
+        TRY(sqlite_change(database, sql, query_key_columns, &(QueryKey){.name = name}, NULL,
+                          problem));
         lines += size + (lines[size] == '\n');
     }
     return STATUS_OK;

@@ -3,6 +3,7 @@
 // makes every commit durable.
 #include "server/db/sqlite.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -45,7 +46,8 @@ static Status report_full(const char *path, Problem *problem) {
     const char *slash = path != NULL ? strrchr(path, '/') : NULL;
     const int size = slash != NULL ? (int)(slash - path) : 0;
     if (slash == NULL || statvfs(path, &disk) != 0)
-        return problem_set(problem, STATUS_FULL, "there is no room left for the database");
+        return problem_set(problem, STATUS_FULL, "there is no room left for %s",
+                           slash != NULL ? path : "the database");
     const unsigned long long left =
         (unsigned long long)disk.f_bavail * (unsigned long long)disk.f_frsize;
     return problem_set(problem, STATUS_FULL,
@@ -166,7 +168,7 @@ static const SqlColumn *column_find(const SqlColumn *columns, const char *name) 
 }
 
 static bool columns_are_checked(const SqlColumn *columns) {
-    for (; columns != NULL && columns->name != NULL; columns++)
+    for (; columns->name != NULL; columns++)
         if ((columns->flags & COLUMN_CHECKED) != 0)
             return true;
     return false;
@@ -253,28 +255,23 @@ static void sql_expand(const char *sql, const SqlColumn *keys, const SqlColumn *
 }
 
 // Finds the members of the parameters and of the results.
-static Status statement_resolve(Statement *statement, const SqlColumn *keys,
-                                const SqlColumn *columns, Problem *problem) {
+static void statement_resolve(Statement *statement, const SqlColumn *keys,
+                              const SqlColumn *columns) {
     statement->parameter_count = sqlite3_bind_parameter_count(statement->handle);
     statement->result_count = sqlite3_column_count(statement->handle);
     statement->checks = -1;
-    if (statement->parameter_count > PARAMETERS || statement->result_count > PARAMETERS)
-        return problem_set(problem, STATUS_INTERNAL, "more than %d parameters of a statement",
-                           PARAMETERS);
+    assert(statement->parameter_count <= PARAMETERS && statement->result_count <= PARAMETERS);
     for (int i = 0; i < statement->parameter_count; i++) {
         const char *name = sqlite3_bind_parameter_name(statement->handle, i + 1);
-        statement->parameters[i] = name != NULL ? column_find(keys, name + 1) : NULL;
-        if (statement->parameters[i] == NULL && (name == NULL || strcmp(name, ":checks") != 0))
-            return problem_set(problem, STATUS_INTERNAL, "no member for the parameter %s",
-                               name != NULL ? name : "?");
+        statement->parameters[i] = column_find(keys, name + 1);
+        assert(statement->parameters[i] != NULL || strcmp(name, ":checks") == 0);
     }
     for (int i = 0; i < statement->result_count; i++) {
         const char *name = sqlite3_column_name(statement->handle, i);
-        statement->results[i] = name != NULL ? column_find(columns, name) : NULL;
-        if (name != NULL && strcmp(name, "checks") == 0)
+        statement->results[i] = column_find(columns, name);
+        if (strcmp(name, "checks") == 0)
             statement->checks = i;
     }
-    return STATUS_OK;
 }
 
 static Status statement_find(Sqlite *database, const char *sql, const SqlColumn *keys,
@@ -284,8 +281,7 @@ static Status statement_find(Sqlite *database, const char *sql, const SqlColumn 
             *statement = database->statements[i];
             return STATUS_OK;
         }
-    if (database->statement_count == STATEMENTS)
-        return problem_set(problem, STATUS_INTERNAL, "more than %d SQL texts", STATEMENTS);
+    assert(database->statement_count < STATEMENTS);
     Bytes text = {0};
     sql_expand(sql, keys, columns, &text);
     Statement *made = text.is_failed ? NULL : calloc(1, sizeof *made);
@@ -296,14 +292,12 @@ static Status statement_find(Sqlite *database, const char *sql, const SqlColumn 
         sqlite3_prepare_v3(database->connection, text.at, -1, SQLITE_PREPARE_PERSISTENT,
                            &made->handle, NULL) != SQLITE_OK)
         status = report(database->connection, "preparing a statement", problem);
-    if (status == STATUS_OK)
-        status = statement_resolve(made, keys, columns, problem);
     bytes_clear(&text);
     if (status != STATUS_OK) {
-        sqlite3_finalize(made != NULL ? made->handle : NULL);
         free(made);
         return status;
     }
+    statement_resolve(made, keys, columns);
     made->sql = sql;
     *statement = database->statements[database->statement_count++] = made;
     return STATUS_OK;
@@ -484,8 +478,7 @@ static void damage_describe(Statement *statement, const SqlColumn *column, const
         const char *name = sqlite3_column_name(statement->handle, i);
         const SqlColumn *result = statement->results[i];
         const size_t used = strlen(row);
-        if (result != NULL ? (result->flags & COLUMN_ID) != 0
-                           : name != NULL && strcmp(name, "number") == 0)
+        if (result != NULL ? (result->flags & COLUMN_ID) != 0 : strcmp(name, "number") == 0)
             snprintf(row + used, sizeof row - used, "%s%s %.80s", used > 0 ? ", " : " (", name,
                      (const char *)sqlite3_column_text(statement->handle, i));
     }
@@ -743,7 +736,9 @@ static const char copy_settings[] = "PRAGMA locking_mode = EXCLUSIVE;"
 static Status make_file(const char *path, Problem *problem) {
     const int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (file < 0)
-        return problem_set(problem, STATUS_IO, "cannot make %s: %s", path, strerror(errno));
+        return is_full(errno) ? report_full(path, problem)
+                              : problem_set(problem, STATUS_IO, "cannot open %s for writing: %s",
+                                            path, strerror(errno));
     close(file);
     return STATUS_OK;
 }
@@ -786,9 +781,7 @@ Status sqlite_open(const char *path, SqliteMode mode, Sqlite **database, Problem
                                      SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL);
     Status status = STATUS_OK;
     const int cause = made->connection != NULL ? system_cause(made->connection) : 0;
-    if (code != SQLITE_OK && code != SQLITE_NOMEM && is_full(cause)) {
-        status = report_full(path, problem);
-    } else if (code != SQLITE_OK) {
+    if (code != SQLITE_OK) {
         status = problem_set(problem, code == SQLITE_NOMEM ? STATUS_NO_MEMORY : STATUS_IO,
                              "cannot open %s: %s%s%s", path != NULL ? path : "a database in memory",
                              sqlite3_errstr(code), cause != 0 ? ": " : "",
@@ -975,6 +968,8 @@ static Status copy_pages(Sqlite *from, Sqlite *to, const Progress *watch, Proble
     (void)sqlite3_backup_finish(backup); // the copy's connection has its error
     if (!is_wanted)
         return problem_set(problem, STATUS_CANCELLED, "copying the database was interrupted");
+    if (code != SQLITE_DONE && system_cause(from->connection) == EIO)
+        return report_unreadable(sqlite3_db_filename(from->connection, "main"), problem);
     return code == SQLITE_DONE ? STATUS_OK
                                : report(to->connection, "copying the database", problem);
 }

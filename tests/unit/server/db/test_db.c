@@ -326,3 +326,56 @@ TEST_IN(series_are_kept_under_a_budget_and_the_longest_unused_goes, make_folder,
     assert_int_equal(db_series_load(db, "r-9", &body, &size, NULL), STATUS_NOT_FOUND);
     db_close(db);
 }
+
+// Jobs go until the database is small enough, or none is left.
+TEST(jobs_are_removed_while_the_database_is_too_large) {
+    enum { TITLE = 60000, JOBS = 40 };
+    Db *db = open_store(NULL);
+    char *title = calloc(1, TITLE), id[16];
+    JobRow row;
+    Removed removed;
+    size_t gone = 0;
+    memset(title, 'x', TITLE - 1);
+    for (int i = 0; i < JOBS; i++) {
+        snprintf(id, sizeof id, "j-%d", i);
+        row = job_row(id, i == 0 ? 0 : 2);
+        row.title = title;
+        row.created_unix_ms = 1000 + i;
+        assert_int_equal(db_job_add(db, &row, NULL), STATUS_OK);
+    }
+    do {
+        assert_int_equal(db_remove(db, &(KeepRules){.bytes = JOBS / 2 * TITLE}, &removed, NULL),
+                         STATUS_OK);
+        gone += removed.jobs;
+    } while (removed.is_more);
+    assert_in_range(gone, JOBS / 4, JOBS - 1);
+    for (gone = 0; db_remove(db, &(KeepRules){.bytes = 1}, &removed, NULL) == STATUS_OK;) {
+        gone += removed.jobs;
+        if (!removed.is_more)
+            break;
+    }
+    JobRow first;
+    assert_int_equal(db_job_load(db, "j-0", &first, NULL), STATUS_OK); // it is not finished
+    job_row_clear(&first);
+    assert_int_equal(db_job_load(db, "j-39", &first, NULL), STATUS_NOT_FOUND);
+    free(title);
+    db_close(db);
+}
+
+static void note_fault(void *context, Status status, const char *detail) {
+    assert_int_equal(status, STATUS_TOO_LARGE);
+    text_fit(context, 200, detail);
+}
+
+TEST(a_series_of_more_than_a_billion_bytes_is_not_stored) {
+    Db *db = open_store(NULL);
+    const size_t size = 1000000001;
+    char detail[200] = "", *body = malloc(size); // never touched
+    if (body == NULL)
+        skip();
+    assert_int_equal(
+        db_series_post(db, "r-1", body, size, 2 * size, &(WriteDone){note_fault, detail}),
+        STATUS_OK);
+    db_close(db);
+    assert_string_equal(detail, "body is too long to be stored; must be at most a billion bytes");
+}

@@ -193,3 +193,38 @@ TEST(materials_revisions_and_bytes_have_limits) {
     assert_int_equal(now.measurements, 1);
     db_close(db);
 }
+
+TEST(what_is_not_there_is_not_written_to) {
+    Db *db = felt_store(NULL);
+    MaterialRevision one = felt_saying(0.5);
+    MaterialMeasurement made = {.slug = "felt", .comment = "", .document = "{}"};
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(db_material_revise(db, &one, ANY_VERSION, &problem), STATUS_NOT_FOUND);
+    assert_string_equal(problem.detail, "there is no material \"felt\"");
+    assert_int_equal(db_material_measure(db, &made, ANY_VERSION, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(felt_review(db, 1, "approved", NULL, ANY_VERSION), STATUS_NOT_FOUND);
+    assert_int_equal(db_material_add(db, &one, NULL), STATUS_OK);
+    assert_int_equal(felt_review(db, 2, "approved", NULL, ANY_VERSION), STATUS_NOT_FOUND);
+    db_close(db);
+}
+
+// One revision is there of each material; where they are gone the database is damaged.
+TEST(a_material_without_revisions_is_damage) {
+    Db *db = felt_store(NULL);
+    MaterialRevision one = felt_saying(0.5);
+    MaterialState now;
+    Problem problem;
+    assert_int_equal(db_material_add(db, &one, NULL), STATUS_OK);
+    assert_int_equal(
+        db_write(db, apply_sql,
+                 "PRAGMA defer_foreign_keys = ON; DROP TRIGGER material_revisions_stay; "
+                 "DELETE FROM material_revisions WHERE name = 'Felt'",
+                 NULL),
+        STATUS_OK);
+    problem_clear(&problem);
+    assert_int_equal(db_material_state(db, "felt", &now, &problem), STATUS_INTERNAL);
+    assert_non_null(strstr(problem.detail, "the revisions of the material felt are missing"));
+    assert_int_equal(db_material_revise(db, &one, ANY_VERSION, NULL), STATUS_INTERNAL);
+    db_close(db);
+}

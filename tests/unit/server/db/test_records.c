@@ -7,6 +7,8 @@
 #include <string.h>
 
 #include "server/db/sqlite.h"
+#include "server/util/bytes.h"
+#include "server/util/gzip.h"
 #include "tests/support/scratch.h"
 #include "tests/support/test.h"
 
@@ -169,4 +171,42 @@ TEST(a_record_is_in_memory_once_and_follows_the_catalogue) {
     refcount_unref(&again->shared);
     refcount_unref(&other->shared);
     db_end(db);
+}
+
+// Samples whose checksums are right and whose digest is not: another value, one too few.
+TEST(samples_that_have_not_their_digest_are_no_answer) {
+    static const double other[] = {1, -2, 0.25};
+    Db *db = db_make();
+    NamedRecord *named;
+    char path[SCRATCH_SIZE + 16];
+    Sqlite *database;
+    add_new(db, "quake", 1);
+    db_close(db);
+    snprintf(path, sizeof path, "%s/impactd.db", folder);
+    for (size_t count = 3; count >= 2; count--) {
+        const uint32_t checks[] = {gzip_crc32(0, (const char *)other, count * sizeof *other),
+                                   gzip_crc32(0, "quake", 5)};
+        Bytes sql = {0};
+        bytes_text(
+            &sql,
+            "DROP TRIGGER IF EXISTS record_samples_keep; UPDATE record_samples SET samples = x'");
+        for (size_t i = 0; i < count * sizeof *other; i++)
+            bytes_format(&sql, "%02x", (unsigned)((const unsigned char *)other)[i]);
+        bytes_text(&sql, "', checks = x'");
+        for (size_t i = 0; i < sizeof checks; i++)
+            bytes_format(&sql, "%02x", (unsigned)((const unsigned char *)checks)[i]);
+        bytes_text(&sql, "'");
+        assert_int_equal(sqlite_open(path, DATABASE_WRITER, &database, &problem), STATUS_OK);
+        if (sqlite_execute(database, sql.at, &problem) != STATUS_OK)
+            fail_msg("%s", problem.detail);
+        sqlite_close(database);
+        bytes_clear(&sql);
+        assert_int_equal(db_open(folder, &db, &problem), STATUS_OK);
+        problem_clear(&problem);
+        assert_int_equal(db_record_named(db, "quake", &named, &problem), STATUS_INTERNAL);
+        assert_null(named);
+        assert_non_null(strstr(problem.detail, "its samples differ from their digest"));
+        db_close(db);
+    }
+    scratch_remove(folder);
 }
