@@ -505,6 +505,20 @@ TEST(labels_and_title_of_a_live_job_are_set_each_alone) {
     scratch_remove(room.directory);
 }
 
+TEST(only_ids_of_jobs_have_a_time) {
+    static const char *const wrong[] = {"",
+                                        "j-",
+                                        "r-0006439e5f2c00000123456789abcdef",
+                                        "j-0006439e5f2c00000123456789abcde",
+                                        "j-0006439e5f2c00000123456789abcdeg",
+                                        "j-0006439e5f2c00000123456789abcdef0"};
+    char id[40];
+    assert_true(job_id_make(id));
+    assert_true(job_id_unix_ms(id) > 1600000000000);
+    for (size_t i = 0; i < COUNT(wrong); i++)
+        assert_int_equal(job_id_unix_ms(wrong[i]), -1);
+}
+
 static size_t count_rows(Room *room) {
     JobRows rows;
     const JobSearch all = job_search_all(100);

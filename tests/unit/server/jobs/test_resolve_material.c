@@ -225,6 +225,18 @@ TEST_IN(a_name_alone_is_the_approved_head_and_never_a_deprecated_one, set_up, te
     }
 }
 
+TEST_IN(a_material_that_came_with_a_study_is_looked_up, set_up, tear_down) {
+    static const char study[] = ", \"study\": {\"kind\": \"sweep\", \"axes\": [{\"pointer\": "
+                                "\"/dampers/0/buffer\", \"values\": [\"sponge\"]}], "
+                                "\"materials\": [{\"material\": \"%s\"}]}";
+    char text[300];
+    snprintf(text, sizeof text, study, "sponge@1");
+    resolve_well("\"buffer\": \"sponge\"", text);
+    snprintf(text, sizeof text, study, "sponge@9");
+    assert_int_equal(prepare("\"buffer\": \"sponge\"", text), STATUS_INVALID);
+    expect_fault("/study/materials/0", "has no such revision");
+}
+
 // As they were before any material had more than one revision.
 TEST_IN(canonical_forms_of_named_revisions_never_change, set_up, tear_down) {
     static const struct {

@@ -157,6 +157,39 @@ TEST(many_points_of_a_chunk_fail_each_with_its_reason_also_when_they_are_made_ag
     room_end(&room);
 }
 
+TEST(a_job_without_a_sweep_has_no_table) {
+    static const char *const endings[] = {"",
+                                          ", \"study\": {\"kind\": \"ensemble\", \"runs\": 100}"};
+    Room room = room_make(1);
+    Problem problem;
+    for (size_t i = 0; i < COUNT(endings); i++) {
+        char text[1024], id[40];
+        SweepView view;
+        snprintf(text, sizeof text,
+                 "{\"structure\": {\"mass\": 1.35, \"stiffness\": 865}, \"excitation\": {\"kind\": "
+                 "\"random\", \"band\": [0.1, 10], \"rms\": 1, \"seed\": 3}, \"duration\": 10000, "
+                 "\"sample_rate\": 100%s}",
+                 endings[i]);
+        room_submit(&room, text, NULL, id);
+        Job *job;
+        bool is_durable = false;
+        assert_int_equal(jobs_find(room.manager, id, &job, &problem), STATUS_OK);
+        job_save(job);
+        while (!is_durable) {
+            room_nap(1000000);
+            assert_int_equal(job_is_durable(job, &is_durable, &problem), STATUS_OK);
+        }
+        job_unref(job);
+        problem_clear(&problem);
+        assert_int_equal(sweep_view_load(room.db, id, true, false, &view, &problem),
+                         STATUS_NOT_FOUND);
+        assert_non_null(strstr(problem.detail, "no sweep"));
+        sweep_view_clear(&view);
+        room_dismiss(&room, id);
+    }
+    room_end(&room);
+}
+
 // For the thread sanitizer.
 TEST(the_client_of_a_job_is_read_while_it_ends) {
     Room room = room_make(2);
