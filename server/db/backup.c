@@ -101,7 +101,8 @@ static Status check_copy(Copying *copying, Problem *problem) {
     if (status != STATUS_OK)
         return problem_set(problem, status,
                            "%s: %s%s%s; nothing was copied, keep the other backups",
-                           copying->source, found.detail, damage[0] != '\0' ? ": " : "", damage);
+                           sqlite_could_not_read(copying->copy) ? copying->target : copying->source,
+                           found.detail, damage[0] != '\0' ? ": " : "", damage);
     return sqlite_first(copying->copy, sql, NULL, NULL, backup_columns, &copying->backup, NULL,
                         problem);
 }

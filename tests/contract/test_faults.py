@@ -47,6 +47,27 @@ def test_a_disk_that_does_not_answer_is_not_called_damaged():
     assert judged(campaign) > 15
 
 
+def test_a_backup_names_the_file_that_cannot_be_read():
+    """The database where reading it fails, the copy where that cannot be read back: not the other one."""
+    said = []
+
+    class Case(commands.Case):
+        def run(self, folder, environment):
+            code, text = super().run(folder, environment)
+            said.append(text if code else "")
+            return code, text
+
+    campaign = commands.Campaign("EIO", 25)
+    kept, commands.CASES["backup"] = commands.CASES["backup"], Case("backup", "{}/new.db", "--data", "{}/data", target="new.db")
+    campaign.run("backup")
+    commands.CASES["backup"] = kept
+    assert judged(campaign) > 20
+    for path in ("data/impactd.db could not be read (Input", "new.db: the database could not be read (Input"):
+        assert any(path in text for text in said), (path, said)
+    assert not any("data/impactd.db: the database could not be read" in text for text in said), said
+    assert not any("copying the database failed: disk I/O error" in text and "impactd.db" in text for text in said), said
+
+
 def test_a_command_without_memory_says_so():
     """A command where an allocation fails, the first one too: exit code 1 with the reason, and no file; or its work is done."""
     for name, stride, least in (("import", 1, 18), ("backup", 250, 18), ("start", 500, 10)):
