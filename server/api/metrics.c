@@ -97,14 +97,12 @@ Status metrics_show(App *app, const Request *request, Reply *reply, Problem *pro
     Bytes bytes = {.most = 4 << 20};
     metrics_family(&bytes, "impactd_build_info", "gauge", "The program's version; always 1.");
     bytes_format(&bytes, "impactd_build_info{version=\"%s\"} 1\n", program_version);
-    if (app->request_metrics != NULL)
-        request_metrics_write(app->request_metrics, &bytes);
+    request_metrics_write(app->request_metrics, &bytes);
     const Server *server = atomic_load(&app->server);
     if (server != NULL)
         metrics_gauge(&bytes, "impactd_http_connections", "Clients connected.",
                       (double)server_connections(server));
-    if (app->response_cache != NULL)
-        metrics_write_responses(&bytes, app->response_cache);
+    metrics_write_responses(&bytes, app->response_cache);
     metrics_write_queue(&bytes, app);
     jobs_write_metrics(app->manager, &bytes);
     metrics_write_db(&bytes, app->db);

@@ -257,8 +257,7 @@ static void serve_greet(const Server *server, const ServeSettings *settings, con
 }
 
 static void forget_answers(void *response_cache) {
-    if (response_cache != NULL)
-        response_cache_clear(response_cache);
+    response_cache_clear(response_cache);
 }
 
 // SIGHUP: reads a renewed certificate.
@@ -375,9 +374,9 @@ static Status serve_open(Serving *serving, const ServeSettings *settings, Proble
     TRY(status_first(all, COUNT(all)));
     access->log_mode = (LogMode)settings->journal;
     app->request_metrics = access->request_metrics = request_metrics_new(routes);
-    if (access->request_metrics == NULL)
-        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the counters");
     app->response_cache = response_cache_new(settings->cache_bytes / RESPONSE_SHARE);
+    if (access->request_metrics == NULL || app->response_cache == NULL)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the server");
     TRY(db_open(settings->data, &app->db, problem));
     TRY(tokens_open(app->db, needs_tokens, &access->tokens, problem));
     if (needs_tokens)

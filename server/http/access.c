@@ -20,7 +20,7 @@ Status access_authorize(const AccessControl *access, const char *scope, Request 
                         Problem *problem) {
     request->client = NULL;
     request->is_sender_only = false;
-    if (access == NULL || access->tokens == NULL || strcmp(scope, "open") == 0)
+    if (strcmp(scope, "open") == 0)
         return STATUS_OK;
     const Status status =
         tokens_check(access->tokens, request->authorization, scope, &request->holder, problem);
@@ -81,7 +81,7 @@ static void request_metrics_count(RequestMetrics *metrics, const Route *route, i
                                   uint64_t received, uint64_t sent) {
     RouteMetrics *row =
         &metrics->rows[route != NULL ? (size_t)(route - metrics->table) : metrics->count];
-    counter_add(&row->classes[code / 100 > 0 && code / 100 < CLASSES ? code / 100 : 0], 1);
+    counter_add(&row->classes[code / 100 % CLASSES], 1);
     histogram_add(&row->seconds, ns);
     counter_add(&metrics->received, received);
     counter_add(&metrics->sent, sent);
@@ -142,16 +142,13 @@ static void access_log(const Request *request, const Reply *reply, int64_t ns, u
 }
 
 void access_record(const AccessControl *access, const Request *request, const Reply *reply) {
-    if (access == NULL)
-        return;
     const int64_t ns = clock_monotonic_ns() - request->started_ns;
     const bool is_stream = reply->stream.next != NULL;
     const uint64_t sent = !is_stream                         ? reply->body_size
                           : reply->stream.size != UINT64_MAX ? reply->stream.size
                                                              : 0;
-    if (access->request_metrics != NULL)
-        request_metrics_count(access->request_metrics, request->route, reply->code, ns,
-                              request->received, sent);
+    request_metrics_count(access->request_metrics, request->route, reply->code, ns,
+                          request->received, sent);
     const int code = reply->code;
     const bool is_fault = code >= 500 && code != 501 && code != 503 && code != 505;
     if (access->log_mode == LOG_ALL || (access->log_mode == LOG_ERRORS && is_fault))

@@ -23,7 +23,6 @@ void request_metrics_free(RequestMetrics *metrics);
 // In the Prometheus text format; routes without requests are left out.
 void request_metrics_write(const RequestMetrics *metrics, Bytes *bytes);
 
-// All may be NULL: then everything is permitted and nothing is counted.
 typedef struct AccessControl {
     Tokens *tokens;
     RequestMetrics *request_metrics;

@@ -18,7 +18,7 @@ Status address_read(const char *text, Address *address, Problem *problem) {
     const char *port = text;
     const char *colon = strrchr(text, ':');
     if (colon != NULL) {
-        const bool is_bracketed = text[0] == '[' && colon > text && colon[-1] == ']';
+        const bool is_bracketed = text[0] == '[' && colon[-1] == ']';
         const char *from = is_bracketed ? text + 1 : text;
         const size_t size = (size_t)(colon - from) - (is_bracketed ? 1 : 0);
         if (size >= sizeof host || (is_bracketed && size == 0) ||
@@ -55,11 +55,10 @@ bool address_is_loopback(const Address *address) {
 }
 
 bool address_is_any(const Address *address) {
-    unsigned char bytes[16] = {1};
+    unsigned char bytes[16] = {1}; // of none, where it cannot be read
     const bool is_v6 = strchr(address->host, ':') != NULL;
     const size_t size = is_v6 ? 16 : 4;
-    if (inet_pton(is_v6 ? AF_INET6 : AF_INET, address->host, bytes) != 1)
-        return false;
+    (void)inet_pton(is_v6 ? AF_INET6 : AF_INET, address->host, bytes);
     for (size_t i = 0; i < size; i++)
         if (bytes[i] != 0)
             return false;

@@ -582,11 +582,8 @@ void exchange_close(void *context, struct MHD_Connection *connection, void **sta
     *state = NULL;
     if (exchange->forget != NULL)
         exchange->forget(exchange->request.kept);
-    if (exchange->is_answered) {
-        // The client may have left before it was sent.
-        exchange->reply.forget = NULL;
+    if (exchange->is_answered) // its client may have left before it was sent
         reply_clear(&exchange->reply);
-    }
     exchange_drop_body(exchange);
     exchange_end_body(exchange);
     request_close(&exchange->request);

@@ -182,16 +182,14 @@ static void loop_stop(EventLoop *loop) {
 
 static void loop_close(EventLoop *loop) {
     MHD_stop_daemon(loop->daemon);
-
     close(loop->wakeup);
     loop->wakeup = -1;
 }
 
 // As many files as permitted, and how many connections that allows.
 static size_t server_connections_max(void) {
-    struct rlimit files;
-    if (getrlimit(RLIMIT_NOFILE, &files) != 0)
-        return 512;
+    struct rlimit files = {512, 512};
+    (void)getrlimit(RLIMIT_NOFILE, &files);
     if (files.rlim_cur < files.rlim_max) {
         files.rlim_cur = files.rlim_max;
         (void)setrlimit(RLIMIT_NOFILE, &files);

@@ -76,9 +76,8 @@ static int header_fit(Span range, Span type) {
         return 3;
     if (span_is(range, "*/*"))
         return 1;
-    const char *slash = memchr(type.at, '/', type.size);
-    const size_t main = slash == NULL ? 0 : (size_t)(slash - type.at) + 1;
-    if (main > 0 && range.size == main + 1 && range.at[main] == '*' &&
+    const size_t main = strcspn(type.at, "/") + 1;
+    if (range.size == main + 1 && range.at[main] == '*' &&
         strncasecmp(range.at, type.at, main) == 0)
         return 2;
     return 0;

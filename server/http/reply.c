@@ -34,8 +34,6 @@ void reply_default(Reply *reply) {
 void reply_clear(Reply *reply) {
     if (reply->release != NULL)
         reply->release(reply->context);
-    if (reply->forget != NULL)
-        reply->forget(reply->keep);
     reply_default(reply);
 }
 
@@ -221,8 +219,6 @@ Status reply_range(Reply *reply, const Request *request, Problem *problem) {
     if (request->if_range != NULL && strcmp(request->if_range, reply->etag) != 0)
         return STATUS_OK;
     Stream *stream = &reply->stream;
-    if (stream->next != NULL && (stream->cut == NULL || stream->size == UINT64_MAX))
-        return STATUS_OK;
     size_t first = 0, last = 0;
     const size_t size = stream->next != NULL ? (size_t)stream->size : reply->body_size;
     switch (header_range(request->range, size, &first, &last)) {

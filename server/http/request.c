@@ -493,7 +493,7 @@ Status request_require_body(const Request *request, Problem *problem) {
                            encoding);
     if (request->is_too_large)
         return request_error_large(request->body_most, problem);
-    if (request->body == NULL || request->body_size == 0)
+    if (request->body_size == 0)
         return problem_set(problem, STATUS_UNREADABLE, "there is no body");
     return STATUS_OK;
 }

@@ -2,6 +2,7 @@
 // in the pattern, or the rest of the segment: at least one character, never a '/'.
 #include "server/http/router.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -32,10 +33,8 @@ static bool route_match(const char *pattern, const char *path, RouteMatch *match
                 return false;
             continue;
         }
-        const char *close = strchr(pattern, '}');
-        if (close == NULL || match->count == REQUEST_PARAMETERS)
-            return false;
-        pattern = close + 1;
+        assert(match->count < REQUEST_PARAMETERS);
+        pattern = strchr(pattern, '}') + 1;
         size_t size = strcspn(path, "/");
         if (*pattern != '\0' && *pattern != '/') {
             const char *stop = memchr(path, *pattern, size);
@@ -261,8 +260,7 @@ static void router_close(const Router *router, const Request *request, Status st
 
 // Immutable responses are made once: found by their target, which saves the look-up of the route.
 static bool router_find_cached(const Router *router, Request *request, Reply *reply) {
-    if (router->response_cache == NULL || strcmp(request->method, "GET") != 0 ||
-        (request->is_pretty && !request->is_pretty_asked))
+    if (strcmp(request->method, "GET") != 0 || (request->is_pretty && !request->is_pretty_asked))
         return false;
     const bool accepts_gzip = header_accepts_gzip(request->accept_encoding);
     const Route **route = &request->route;
@@ -298,8 +296,7 @@ static Status router_open(const Router *router, Request *request, Reply *reply, 
     TRY(access_authorize(router->access, route->scope, request, problem));
     TRY(router_check_queries(route, request, problem));
     TRY(router_set_parameters(request, &match, problem));
-    if (router->response_cache != NULL)
-        request->cache_age = response_cache_age(router->response_cache);
+    request->cache_age = response_cache_age(router->response_cache);
     return STATUS_OK;
 }
 
@@ -325,9 +322,8 @@ static Status router_finish(const Router *router, Request *request, Reply *reply
                             Problem *problem) {
     base_path_apply(reply->location, sizeof reply->location);
     base_path_apply(reply->link, sizeof reply->link);
-    const bool is_cacheable = router->response_cache != NULL && reply->is_immutable &&
-                              reply->code == 200 && reply->stream.next == NULL &&
-                              !reply->varies_by_accept &&
+    const bool is_cacheable = reply->is_immutable && reply->code == 200 &&
+                              reply->stream.next == NULL && !reply->varies_by_accept &&
                               (!request->is_pretty || request->is_pretty_asked);
     reply_indent(reply, request);
     const bool is_packed = reply_pack(reply, request);
@@ -346,7 +342,7 @@ bool router_answer(const Router *router, Request *request, Reply *reply) {
     const bool is_admitted = status == STATUS_OK;
     if (is_admitted)
         status = request->route->handle(router->app, request, reply, &problem);
-    if (status == STATUS_NOT_FOUND && router->not_found != NULL)
+    if (status == STATUS_NOT_FOUND)
         status = router->not_found(router->app, request, reply, &problem);
     if (status == STATUS_OK && reply->wait_ms == 0)
         status = router_finish(router, request, reply, &problem);
@@ -355,6 +351,5 @@ bool router_answer(const Router *router, Request *request, Reply *reply) {
 }
 
 bool router_still_admits(const Router *router, Request *request) {
-    return request->route == NULL ||
-           access_authorize(router->access, request->route->scope, request, NULL) == STATUS_OK;
+    return access_authorize(router->access, request->route->scope, request, NULL) == STATUS_OK;
 }

@@ -8,10 +8,10 @@
 
 typedef struct Router {
     App *app;
-    const Route *routes;           // ends with method == NULL; the first that fits counts
-    ResponseCache *response_cache; // may be NULL
-    const AccessControl *access;   // NULL: no tokens, nothing is counted
-    Handler *not_found;            // called where a handler found nothing: may answer; or NULL
+    const Route *routes; // ends with method == NULL; the first that fits counts
+    ResponseCache *response_cache;
+    const AccessControl *access;
+    Handler *not_found; // called where a handler found nothing: may answer
 } Router;
 
 extern const Route routes[]; // api/routes.c

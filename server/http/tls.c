@@ -29,8 +29,8 @@ static Status tls_check_time(gnutls_certificate_credentials_t credentials, const
     gnutls_x509_crt_t *chain = NULL;
     unsigned count = 0;
     const int code = gnutls_certificate_get_x509_crt(credentials, 0, &chain, &count);
-    if (code < 0 || count == 0)
-        return problem_set(problem, STATUS_USAGE, "%s holds no certificate", path);
+    if (code < 0)
+        return problem_set(problem, STATUS_NO_MEMORY, "no memory for the certificate");
     const int64_t ends = (int64_t)gnutls_x509_crt_get_expiration_time(chain[0]);
     for (unsigned i = 0; i < count; i++)
         gnutls_x509_crt_deinit(chain[i]);
@@ -89,7 +89,8 @@ Status tls_use(const char *cert, const char *cert_path, const char *key, const c
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the certificate");
     unsigned count = CHAIN_MAX;
     int code =
-        gnutls_pcert_list_import_x509_raw(made->chain, &count, &cert_text, GNUTLS_X509_FMT_PEM, 0);
+        gnutls_pcert_list_import_x509_raw(made->chain, &count, &cert_text, GNUTLS_X509_FMT_PEM,
+                                          GNUTLS_X509_CRT_LIST_IMPORT_FAIL_IF_EXCEED);
     if (code >= 0) {
         made->count = count;
         code = gnutls_privkey_init(&made->key);
@@ -98,6 +99,9 @@ Status tls_use(const char *cert, const char *cert_path, const char *key, const c
         code = gnutls_privkey_import_x509_raw(made->key, &key_text, GNUTLS_X509_FMT_PEM, NULL, 0);
     if (code < 0) {
         certificate_free(made);
+        if (code == GNUTLS_E_SHORT_MEMORY_BUFFER)
+            return problem_set(problem, STATUS_USAGE, "%s has %u certificates; must be at most %d",
+                               cert_path, count, CHAIN_MAX);
         return problem_set(problem, STATUS_USAGE, "%s and %s cannot be used: %s", cert_path,
                            key_path, gnutls_strerror(code));
     }

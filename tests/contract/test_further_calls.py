@@ -38,6 +38,8 @@ def test_pages_of_an_allowed_origin_may_use_the_api():
             problem(daemon.request("POST", "/v1/jobs", json=sponge(), headers={"Origin": origin}), 403)
             reply = daemon.request("OPTIONS", "/v1/jobs", headers={**asked, "Origin": origin})
             assert reply.status == 405 and "access-control-allow-origin" not in reply.headers, reply.headers
+        problem(daemon.request("OPTIONS", "/nothing", headers=asked), 404)
+        assert daemon.get("/version", headers=asked).json()["engine"]  # no preflight
     for bad in ("*", "null", "lab.example.org", "https://lab.example.org/", "https://Lab.example.org"):
         code, _, errors = program.run("serve", "--allow-origin", bad, "--listen", "127.0.0.1:0", "--data", "/nonexistent/x")
         assert code == 2 and "--allow-origin" in errors, (code, errors)
@@ -51,7 +53,8 @@ def test_a_slash_at_the_end_redirects():
                 reply = daemon.request(method, path + "/" + query)
                 assert reply.status == 308 and reply.headers["location"] == path + query, (method, path, reply)
         problem(daemon.request("DELETE", "/v1/jobs/j-1/"), 404)
-        for path in ("//evil.example.org/", "/guide/nothing/", "/nothing/", "/v1/jobs//"):
+        long = "?" + "x" * 3000  # no Location has room for it
+        for path in ("//evil.example.org/", "/guide/nothing/", "/web/nothing/", "/nothing/", "/v1/jobs//", "/v1/jobs/" + long):
             assert daemon.get(path).status == 404, path
     with program.daemon("--base-url", "https://sim.example.org/sim", "--host", "localhost") as daemon:
         assert daemon.get("/sim/v1/jobs/").headers["location"] == "/sim/v1/jobs"

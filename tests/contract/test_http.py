@@ -184,7 +184,9 @@ def test_a_path_with_a_slip_is_told_what_was_meant():
     with program.daemon() as daemon:
         for path, meant in (("/v1/jbos", "/v1/jobs"), ("/v2/records/x", "/v1/records/x"), ("/metrisc", "/metrics"), ("/vresion", "/version")):
             assert f"did you mean {meant}?" in problem(daemon.get(path), 404)["detail"], path
-        assert "did you mean" not in problem(daemon.get("/job/123456789"), 404)["detail"]
+        # Nearest to a long path is one that was cut short.
+        for path in ("/job/123456789", "/v1/materials/" + "x" * 130 + "/revision", "/" + "x" * 200):
+            assert "did you mean" not in problem(daemon.get(path), 404)["detail"], path
 
 
 def test_formats_are_negotiated():
@@ -340,6 +342,9 @@ def test_parts_of_binary_formats():
         assert daemon.get(path, headers={"Range": "bytes=0-1,4-5"}).body == whole
         text = path.replace("npy", "csv")
         assert daemon.get(text, headers={"Range": "bytes=0-1"}).status == 200
+        for _ in range(2):  # the second one is cached, and not compressed either
+            reply = daemon.get(path, headers={"Accept-Encoding": "gzip"})
+            assert reply.body == whole and "content-encoding" not in reply.headers, reply.headers
 
 
 def test_text_is_packed_for_whoever_asks():

@@ -219,6 +219,11 @@ def test_tls_serves_and_refuses_bad_files():
         _, other = certificate(folder, 3)
         done = impactd("serve", "--data", folder, "--tls-cert", cert, "--tls-key", other)
         assert done.returncode == 2 and "not that of the certificate" in done.stderr, done
+        chain = os.path.join(folder, "chain.pem")
+        with open(cert, encoding="utf-8") as one, open(chain, "w", encoding="utf-8") as many:
+            many.write(33 * one.read())
+        done = impactd("serve", "--data", folder, "--tls-cert", chain, "--tls-key", key)
+        assert done.returncode == 2 and "chain.pem has 33 certificates; must be at most 32" in done.stderr, done
         os.chmod(other, 0o644)
         done = impactd("serve", "--data", folder, "--tls-cert", cert, "--tls-key", other)
         assert done.returncode == 2 and "chmod 600" in done.stderr, done

@@ -53,6 +53,13 @@ TEST(what_is_no_base_url_is_refused_with_what_would_be) {
         "http://a/%2e",
         "http://a/0123456789012345678901234567890123456789012345678901234567890123",
     };
+    char slashes[300] = "http://a";
+    memset(slashes + 8, '/', 280); // those at the end are no part of the path
+    BaseUrl with_slashes;
+    Problem too_long;
+    problem_clear(&too_long);
+    assert_int_equal(base_url_read(slashes, &with_slashes, &too_long), STATUS_USAGE);
+    assert_non_null(strstr(too_long.detail, "is too long: 255 bytes"));
     for (size_t i = 0; i < COUNT(bad); i++) {
         BaseUrl url;
         Problem problem;

@@ -25,6 +25,14 @@ TEST(a_target_is_taken_apart_and_decoded) {
     request_close(&request);
 }
 
+TEST(a_plus_is_a_blank_in_a_query_alone) {
+    char path[] = "a+b%2B", query[] = "a+b%2B";
+    assert_true(request_decode(path, false));
+    assert_string_equal(path, "a+b+");
+    assert_true(request_decode(query, true));
+    assert_string_equal(query, "a b+");
+}
+
 TEST(broken_queries_are_refused) {
     static const char *const targets[] = {"/?a=%",   "/?a=%4",  "/?a=%zz",
                                           "/?a=%00", "/?%g0=1", "/?a=1&a=2"};
@@ -51,15 +59,16 @@ TEST(numbers_in_queries_have_bounds) {
     Problem problem;
     problem_clear(&problem);
     double value = 0;
-    assert_int_equal(open_target(&request, "/?a=2.5&b=nan&c=0x10&d=&e=+1&f=11&g=1e1&h=1%202"),
-                     STATUS_OK);
+    assert_int_equal(
+        open_target(&request, "/?a=2.5&b=nan&c=0x10&d=&e=+1&f=11&g=1e1&h=1%202&i=1e999"),
+        STATUS_OK);
     assert_int_equal(request_number(&request, "a", 0, 10, 1, &value, &problem), STATUS_OK);
     assert_true(value == 2.5);
     assert_int_equal(request_number(&request, "z", 0, 10, 7, &value, &problem), STATUS_OK);
     assert_true(value == 7);
     assert_int_equal(request_number(&request, "g", 0, 10, 7, &value, &problem), STATUS_OK);
     assert_true(value == 10);
-    static const char *const bad[] = {"b", "c", "d", "e", "f", "h"}; // "+1" is " 1" in a query
+    static const char *const bad[] = {"b", "c", "d", "e", "f", "h", "i"}; // "+1" is " 1" in a query
     for (size_t i = 0; i < COUNT(bad); i++)
         assert_int_equal(request_number(&request, bad[i], 0, 10, 1, &value, &problem),
                          STATUS_USAGE);

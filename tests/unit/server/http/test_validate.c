@@ -52,6 +52,7 @@ TEST(ordinary_requests_pass) {
         {"POST", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "none"}}, 0},
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Sec-Fetch-Site", "cross-site"}}, 0},
         {"GET", "/", "HTTP/1.1", {{"Host", "localhost"}, {"Origin", "http://evil.org"}}, 0},
+        {"GET", "/", "HTTP/1.0", {{"Origin", "http://localhost"}}, 0},
     };
     for (size_t i = 0; i < COUNT(heads); i++)
         assert_int_equal(judge(&heads[i]), 0);
@@ -194,6 +195,12 @@ TEST(a_name_given_for_a_proxy_is_no_foreign_origin) {
         assert_int_equal(request_validate(&request, &named, "/", "HTTP/1.1", &problem),
                          cases[i].code);
     }
+}
+
+// Without a Host header it is not known whether a page of this server asks.
+TEST(an_origin_without_a_host_is_foreign) {
+    const ResultSummary head = {"POST", "/", "HTTP/1.0", {{"Origin", "http://localhost"}}, 403};
+    assert_int_equal(judge(&head), 403);
 }
 
 TEST(a_nul_inside_a_value_is_seen_by_its_size) {
