@@ -113,6 +113,44 @@ def test_a_file_may_come_again():
         assert len(told) == 1 and told[0]["pointer"] == "/measurements/3" and "measurement 1 " in told[0]["detail"], told
 
 
+def test_what_is_stored_never_changes():
+    """A numbered row that differs from the stored one in its test, time, comment, reverts or reviews is refused at that place."""
+    test = {"impactor_mass": 0.11, "base": "fixed", "drops": [{"approach_speed": 0.5, "rebound_speed": 0.2, "contact_time": 0.01}]}
+    first = {"revision": 1, "name": "Felt", "source": "us", "restitution": 0.5, "created": "2026-01-01T00:00:00Z", "comment": "new",
+             "reviews": [{"status": "approved", "reason": "ok", "reviewer": "ana", "created": "2026-01-03T00:00:00Z"}]}
+    second = {**first, "revision": 2, "restitution": 0.6, "created": "2026-01-02T00:00:00Z", "reviews": []}
+    third = {**first, "revision": 3, "created": "2026-01-04T00:00:00Z", "reviews": [], "reverts": 1}
+    measured = {"measurement": 1, "test": test, "created": "2026-01-01T00:00:00Z"}
+
+    def document(*revisions, measurement=measured):
+        one = {"slug": "felt", "measurements": [measurement], "revisions": list(revisions)}
+        return {"format": "impactd-materials", "version": 1, "materials": [one]}
+
+    with program.daemon() as daemon:
+        assert counts(bring(daemon, document(first, second)))["revisions"] == (2, 0)
+        # What it reverts to is stored; here it has other contents.
+        place = "/materials/0/revisions/0/reverts"
+        problem(bring(daemon, document({**third, "reverts": 2})), 422, place)
+        problem(bring(daemon, document(third, {**third, "revision": 4, "reverts": 2})), 422, "/materials/0/revisions/1/reverts")
+        # And here it is in the file, and cannot be read.
+        faults = problem(bring(daemon, document({**third, "restitution": 7}, {**third, "revision": 4, "reverts": 3})), 422)["errors"]
+        assert [fault["pointer"] for fault in faults] == ["/materials/0/revisions/0/restitution"], faults
+        assert counts(bring(daemon, document(third)))["revisions"] == (1, 0)
+        before = export(daemon)
+        review = first["reviews"][0]
+        for at, changed in (("created", {**first, "created": "2026-01-01T00:00:01Z"}), ("comment", {**first, "comment": "old"}),
+                            ("author", {**first, "author": "bob"}), ("reverts", {**third, "reverts": 2}), ("restitution", {**first, "restitution": 0.4}),
+                            ("reviews/0", {**first, "reviews": [{**review, "reviewer": "bob"}]}),
+                            ("reviews/0", {**first, "reviews": [{**review, "reason": "fine"}]}),
+                            ("reviews/0", {**first, "reviews": [{**review, "created": "2026-01-03T00:00:01Z"}]})):
+            (fault,) = problem(bring(daemon, document(changed)), 422, "/materials/0/revisions/0/" + at)["errors"]
+            assert "never change" in fault["detail"], fault
+        for at, changed in (("test", {**measured, "test": {**test, "impactor_mass": 0.12}}), ("created", {**measured, "created": "2026-01-05T00:00:00Z"})):
+            (fault,) = problem(bring(daemon, document(measurement=changed)), 422, "/materials/0/measurements/0/" + at)["errors"]
+            assert "never changes" in fault["detail"], fault
+        assert export(daemon) == before
+
+
 # Faults, each in a row or material of its own: (what, where it is told).
 
 def table_faults(draw, rows, k):
