@@ -54,9 +54,6 @@ typedef struct QueryCounts {
     uint64_t count, bytes, results, jobs;
 } QueryCounts;
 extern const SqlColumn query_counts_columns[];
-// STATUS_INTERNAL where a row that an index led to has another name than was asked for; NULL and ""
-// are unknown.
-Status db_require_name(const char *found, const char *asked, Problem *problem);
 // The first row of a query into `row` of `size` bytes, which is zeroed before. Without one
 // STATUS_NOT_FOUND, of which the format says what is missing.
 __attribute__((format(printf, 8, 9))) Status db_get(Db *db, const char *sql, const QueryKey *key,

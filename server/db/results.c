@@ -267,12 +267,6 @@ Status db_series_load(Db *db, const char *result, char **body, size_t *size, Pro
     text_fit(blob.result, sizeof blob.result, result);
     Status status =
         db_first(db, sql, series_columns, &blob, series_columns, &found, &is_found, problem);
-    if (status == STATUS_OK)
-        status = db_require_name(found.result, result, problem);
-    if (status != STATUS_OK) {
-        free(found.body.at);
-        found.body = (StoredBytes){NULL, 0};
-    }
     *body = found.body.at;
     *size = found.body.size;
     if (status == STATUS_OK && is_found && used != NULL) {

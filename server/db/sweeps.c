@@ -59,14 +59,10 @@ Status db_sweep_begin(Db *db, SweepRow *row, Problem *problem) {
 
 Status db_sweep_load(Db *db, const char *result, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT {columns} FROM sweeps WHERE result = :id";
-    TRY(db_get(db, sql, &(QueryKey){.id = result}, sweep_columns, row, sizeof *row, problem,
-               "there is no table of \"%.72s\": either no such result, or its scene asked for "
-               "no sweep",
-               result));
-    const Status status = db_require_name(row->result, result, problem);
-    if (status != STATUS_OK)
-        sweep_row_clear(row);
-    return status;
+    return db_get(db, sql, &(QueryKey){.id = result}, sweep_columns, row, sizeof *row, problem,
+                  "there is no table of \"%.72s\": either no such result, or its scene asked for "
+                  "no sweep",
+                  result);
 }
 
 Status db_sweep_asked(Db *db, const char *job, SweepRow *row, Problem *problem) {

@@ -418,35 +418,6 @@ Status db_first(Db *db, const char *sql, const SqlColumn *keys, const void *key,
     return status;
 }
 
-Status db_require_name(const char *found, const char *asked, Problem *problem) {
-    if (found == NULL || found[0] == '\0' || asked == NULL || strcmp(found, asked) == 0)
-        return STATUS_OK;
-    return problem_set(problem, STATUS_INTERNAL,
-                       "the database is damaged: an index leads from %.72s to %.72s; put a backup "
-                       "in its place (impactd restore)",
-                       asked, found);
-}
-
-// The name of the row is that of the key, where both have one.
-static Status row_require_key(const SqlColumn *columns, const char *row, const QueryKey *key,
-                              Problem *problem) {
-    for (const SqlColumn *column = columns; column->name != NULL; column++) {
-        const char *name = column->kind == COLUMN_TEXT
-                               ? *(char *const *)(const void *)(row + column->offset)
-                               : row + column->offset;
-        if ((column->flags & COLUMN_ID) == 0 ||
-            (column->kind != COLUMN_TEXT && column->kind != COLUMN_NAME))
-            continue;
-        if (strcmp(column->name, "id") == 0)
-            TRY(db_require_name(name, key->id, problem));
-        else if (strcmp(column->name, "name") == 0)
-            TRY(db_require_name(name, key->name, problem));
-        else if (strcmp(column->name, "slug") == 0)
-            TRY(db_require_name(name, key->slug, problem));
-    }
-    return STATUS_OK;
-}
-
 Status db_get(Db *db, const char *sql, const QueryKey *key, const SqlColumn *columns, void *row,
               size_t size, Problem *problem, const char *format, ...) {
     bool is_found;
@@ -454,11 +425,8 @@ Status db_get(Db *db, const char *sql, const QueryKey *key, const SqlColumn *col
     va_list arguments;
     memset(row, 0, size);
     TRY(db_first(db, sql, query_key_columns, key, columns, row, &is_found, problem));
-    const Status status = row_require_key(columns, row, key, problem);
-    if (status != STATUS_OK)
-        row_clear(columns, row, size);
-    if (is_found || status != STATUS_OK)
-        return status;
+    if (is_found)
+        return STATUS_OK;
     va_start(arguments, format);
     vsnprintf(missing, sizeof missing, format, arguments);
     va_end(arguments);

@@ -42,15 +42,23 @@ def entry_of(folder, index, key, other):
 
 
 def test_an_index_that_leads_to_another_row_is_damage():
-    """A result, a record and a material whose entries lead to the row of another: 500, not the other's numbers; check-db names it."""
+    """A job, a result, a record and a material whose entries lead to the row of another: 500, not the other's numbers; check-db names it."""
     with tempfile.TemporaryDirectory() as base:
         whole = os.path.join(base, "whole")
         targets = damage.fill(whole, False)
         # Not the first row, whose number takes no byte.
         results = [target.split("/")[3] for target in targets if target.endswith("/manifest")][1:3]
+        connection = sqlite3.connect(os.path.join(whole, "impactd.db"))
+        jobs = [row[0] for row in connection.execute("SELECT id FROM jobs ORDER BY number LIMIT 2 OFFSET 1")]
+        connection.close()
         cases = [("sqlite_autoindex_results_1", results[0], results[1], f"/v1/results/{results[0]}"),
+                 ("sqlite_autoindex_results_1", results[0], results[1], f"/v1/results/{results[0]}/impacts.json"),
+                 ("sqlite_autoindex_jobs_1", jobs[0], jobs[1], f"/v1/jobs/{jobs[0]}"),
+                 ("sqlite_autoindex_jobs_1", jobs[0], jobs[1], f"/v1/jobs/{jobs[0]}/scene"),
+                 ("sqlite_autoindex_records_1", "shake", "tremor", "/v1/records/shake"),
                  ("sqlite_autoindex_records_1", "shake", "tremor", "/v1/records/shake/samples.csv"),
                  ("sqlite_autoindex_materials_1", "felt", "cork", "/v1/materials/felt"),
+                 ("sqlite_autoindex_materials_1", "felt", "cork", "/v1/materials/felt/measurements/1"),
                  ("sqlite_autoindex_materials_1", "felt", "cork", "/v1/materials/felt/measurements")]
         for index, key, other, target in cases:
             folder = os.path.join(base, "copy")

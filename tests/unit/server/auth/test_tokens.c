@@ -81,6 +81,10 @@ TEST(tokens_made_and_revoked_elsewhere_are_followed) {
     assert_int_equal(db_token_forget(beside, &row, NULL), STATUS_CONFLICT);
     assert_int_equal(db_token_revoke(beside, &row, NULL), STATUS_OK);
     assert_int_equal(db_token_revoke(beside, &row, NULL), STATUS_CONFLICT);
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(db_token_add(beside, &row, &problem), STATUS_CONFLICT);
+    assert_non_null(strstr(problem.detail, "\"first\" already, revoked; choose another name"));
     until(tokens, first, STATUS_UNAUTHORIZED);
     assert_int_equal(check(tokens, second, "read", client), STATUS_OK);
     assert_int_equal(db_token_forget(beside, &row, NULL), STATUS_OK);
