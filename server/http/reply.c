@@ -151,22 +151,24 @@ void reply_indent_json(Bytes *bytes, const char *text, size_t size) {
     bytes_text(bytes, "\n");
 }
 
-void reply_indent(Reply *reply, const Request *request) {
+Status reply_indent(Reply *reply, const Request *request) {
     enum { INDENT_MAX = 64 << 20 };
     const bool is_json = reply->content_type != NULL && strstr(reply->content_type, "json") != NULL;
     if (!is_json || reply->stream.next != NULL || reply->body_size == 0)
-        return;
+        return STATUS_OK;
     reply->varies_by_accept = reply->varies_by_accept || request_is_pretty_by_accept(request);
     if (!request->is_pretty || reply->body_size > INDENT_MAX)
-        return;
+        return STATUS_OK;
     Bytes source = {0}, indented = {0}; // a body need not have a NUL behind it
     bytes_put(&source, reply->body, reply->body_size);
     if (source.at != NULL)
         reply_indent_json(&indented, source.at, source.count);
     bytes_clear(&source);
-    if (indented.count > 0)
+    const bool is_made = indented.count > 0;
+    if (is_made)
         reply_replace_body(reply, &indented);
     bytes_clear(&indented);
+    return status_made(is_made);
 }
 
 static bool reply_is_text(const char *type) {

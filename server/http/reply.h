@@ -36,8 +36,9 @@ Status reply_embedded(Reply *reply, const Request *request, const EmbeddedFile *
 // The same for a reply that has its tag; the rest of it is released where the client has it.
 bool reply_is_known(Reply *reply, const Request *request);
 
-// Indents JSON that is whole in memory where the request asks for it.
-void reply_indent(Reply *reply, const Request *request);
+// Indents JSON that is whole in memory where the request asks for it. STATUS_NO_MEMORY: it is as it
+// was, which is not what its tag stands for.
+Status reply_indent(Reply *reply, const Request *request);
 // Appends JSON with two spaces for each level; lists of plain values stay on one line.
 void reply_indent_json(Bytes *bytes, const char *text, size_t size);
 

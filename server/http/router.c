@@ -252,7 +252,7 @@ static void router_close(const Router *router, const Request *request, Status st
         char path[REQUEST_TARGET_MAX + 1];
         snprintf(path, sizeof path, "%.*s", (int)strcspn(request->target, "?"), request->target);
         reply_problem(reply, problem, reply->code == 416 ? 416 : 0, path, request->id);
-        reply_indent(reply, request);
+        (void)reply_indent(reply, request);
     }
     if (reply->wait_ms == 0)
         access_record(router->access, request, reply);
@@ -325,7 +325,7 @@ static Status router_finish(const Router *router, Request *request, Reply *reply
     const bool is_cacheable = reply->is_immutable && reply->code == 200 &&
                               reply->stream.next == NULL && !reply->varies_by_accept &&
                               (!request->is_pretty || request->is_pretty_asked);
-    reply_indent(reply, request);
+    TRY(reply_indent(reply, request));
     const bool is_packed = reply_pack(reply, request);
     if (is_cacheable)
         response_cache_put(router->response_cache, request->cache_age, request->target, is_packed,

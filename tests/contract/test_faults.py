@@ -35,6 +35,11 @@ def test_a_failed_allocation_is_answered_503():
     assert tried("allocations", 13, "version", "material", "materials", "series csv", "derived", "export csv", "explain", "run", "material put") > 200
 
 
+def test_an_answer_is_indented_or_refused():
+    """Without memory to indent it the answer that was asked for so is 503: under its tag are no other bytes."""
+    assert tried("allocations", 2, "pretty") > 40
+
+
 def test_a_failed_job_has_a_problem():
     """Without memory for the document that says why a job failed, the job has another one: 503, to be submitted again."""
     assert tried("allocations", 50, "sweep", first=500) > 15

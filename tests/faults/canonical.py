@@ -150,6 +150,7 @@ REQUESTS = {
     "compare": (get("/v1/compare?a={a}&b={b}"), {200}),
     "materials": (get("/v1/materials?q=s"), {200}),
     "material": (get("/v1/materials/sponge"), {200}),
+    "pretty": (get("/v1/materials/sponge?pretty=1"), {200}),
     "history": (get("/v1/materials/sponge/history"), {200}),
     "proposal": (get("/v1/materials/sponge/proposal"), {200}),
     "derived": (get("/v1/materials/sponge/derived?damper_mass=0.11&structure_mass=1.35"), {200}),
