@@ -482,6 +482,6 @@ Status jobs_list(App *app, const Request *request, Reply *reply, Problem *proble
     }
     bytes_text(&bytes, "]}\n");
     if (last[0] != '\0')
-        reply_link_next(request, reply, "before", last);
+        reply_link_next(request, reply, "before", last, &bytes);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

@@ -34,7 +34,7 @@ Status materials_revisions(App *app, const Request *request, Reply *reply, Probl
     }
     bytes_text(&bytes, "]}\n");
     if (revisions.count > 0)
-        material_page_link(request, reply, revisions.at[revisions.count - 1].revision);
+        material_page_link(request, reply, revisions.at[revisions.count - 1].revision, &bytes);
     material_revisions_clear(&revisions);
     return reply_json(reply, 200, &bytes, STATUS_OK, problem);
 }
@@ -64,7 +64,7 @@ Status materials_history(App *app, const Request *request, Reply *reply, Problem
     }
     bytes_text(&bytes, "]}\n");
     if (entries.count > 0)
-        material_page_link(request, reply, entries.at[entries.count - 1].version);
+        material_page_link(request, reply, entries.at[entries.count - 1].version, &bytes);
     audit_entries_clear(&entries);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }
@@ -168,7 +168,7 @@ static Status uses_list(App *app, const Request *request, uint64_t revision, Rep
     }
     bytes_text(&bytes, "]}\n");
     if (uses.count > limit)
-        material_page_link(request, reply, (uint64_t)uses.at[limit - 1].number);
+        material_page_link(request, reply, (uint64_t)uses.at[limit - 1].number, &bytes);
     free(uses.at);
     return reply_json(reply, 200, &bytes, STATUS_OK, problem);
 }

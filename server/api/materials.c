@@ -51,11 +51,11 @@ Status material_page_read(const Request *request, size_t initial, size_t max, ui
     return STATUS_OK;
 }
 
-void material_page_link(const Request *request, Reply *reply, uint64_t last) {
+void material_page_link(const Request *request, Reply *reply, uint64_t last, Bytes *body) {
     char number[24];
     snprintf(number, sizeof number, "%llu", (unsigned long long)last);
     if (last > 1)
-        reply_link_next(request, reply, "before", number);
+        reply_link_next(request, reply, "before", number, body);
 }
 
 Status material_body_read(const Request *request, const char *whose, const Field *fields,
@@ -282,7 +282,7 @@ Status materials_list(App *app, const Request *request, Reply *reply, Problem *p
     if (status == STATUS_OK)
         status = search_run(app->db, &search, &bytes, last, &is_more, problem);
     if (status == STATUS_OK && is_more)
-        reply_link_next(request, reply, "after", last);
+        reply_link_next(request, reply, "after", last, &bytes);
     bytes_clear(&search.words);
     bytes_clear(&search.kind);
     bytes_text(&bytes, "]}\n");

@@ -33,7 +33,7 @@ typedef struct MaterialPage {
 Status material_page_read(const Request *request, size_t initial, size_t max, uint64_t newest,
                           MaterialPage *page, Problem *problem);
 // Links the next page after the item numbered `last`; 0: there is no item.
-void material_page_link(const Request *request, Reply *reply, uint64_t last);
+void material_page_link(const Request *request, Reply *reply, uint64_t last, Bytes *body);
 
 // The JSON body of a request as `fields`; faults of types and ranges are in `problem`, to which
 // more may be added. STATUS_OK: it is an object. Cleared by fields_clear in any case.

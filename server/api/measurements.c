@@ -239,7 +239,7 @@ Status measurements_list(App *app, const Request *request, Reply *reply, Problem
     }
     bytes_text(&bytes, "]}\n");
     if (status == STATUS_OK && heads.count > 0)
-        material_page_link(request, reply, heads.at[heads.count - 1].measurement);
+        material_page_link(request, reply, heads.at[heads.count - 1].measurement, &bytes);
     material_measurements_clear(&heads);
     return reply_json(reply, 200, &bytes, status, problem);
 }

@@ -342,7 +342,7 @@ Status records_list(App *app, const Request *request, Reply *reply, Problem *pro
     }
     bytes_text(&bytes, "]}\n");
     if (rows.count > limit)
-        reply_link_next(request, reply, "after", rows.at[limit - 1].name);
+        reply_link_next(request, reply, "after", rows.at[limit - 1].name, &bytes);
     record_rows_clear(&rows);
     return reply_bytes(reply, 200, type_json, &bytes, problem);
 }

@@ -247,7 +247,8 @@ Status reply_range(Reply *reply, const Request *request, Problem *problem) {
     return problem_set(problem, STATUS_USAGE, "the range is outside the %zu bytes there are", size);
 }
 
-void reply_link_next(const Request *request, Reply *reply, const char *name, const char *value) {
+void reply_link_next(const Request *request, Reply *reply, const char *name, const char *value,
+                     Bytes *body) {
     Bytes bytes = {.most = sizeof reply->link - 1};
     bytes_format(&bytes, "<%s?", request->path);
     for (size_t i = 0; i < request->query_count; i++)
@@ -259,7 +260,9 @@ void reply_link_next(const Request *request, Reply *reply, const char *name, con
     bytes_format(&bytes, "%s=", name);
     bytes_percent(&bytes, value);
     bytes_text(&bytes, ">; rel=\"next\"");
-    if (!bytes.is_failed)
+    if (bytes.is_failed)
+        body->is_failed = true;
+    else
         snprintf(reply->link, sizeof reply->link, "%s", bytes.at);
     bytes_clear(&bytes);
 }

@@ -49,8 +49,10 @@ bool reply_pack(Reply *reply, const Request *request);
 // ranges. STATUS_USAGE with code 416 set in `reply` where there is no such part.
 Status reply_range(Reply *reply, const Request *request, Problem *problem);
 
-// Links the next page: the same queries, with `name` now `value`.
-void reply_link_next(const Request *request, Reply *reply, const char *name, const char *value);
+// Links the next page: the same queries, with `name` now `value`. Without memory for it `body`
+// fails: a page without a link is the last one.
+void reply_link_next(const Request *request, Reply *reply, const char *name, const char *value,
+                     Bytes *body);
 
 // The format of the extension in the path's `parameter`, else by Accept, out of `count`.
 // STATUS_NOT_FOUND, STATUS_NOT_ACCEPTABLE.

@@ -40,6 +40,11 @@ def test_an_answer_is_indented_or_refused():
     assert tried("allocations", 2, "pretty") > 40
 
 
+def test_a_page_has_its_link_or_is_refused():
+    """Without memory for the link to the next page a list is 503: without the link it would be the last page."""
+    assert tried("allocations", 2, "page") > 80
+
+
 def test_a_failed_job_has_a_problem():
     """Without memory for the document that says why a job failed, the job has another one: 503, to be submitted again."""
     assert tried("allocations", 50, "sweep", first=500) > 15

@@ -149,6 +149,7 @@ REQUESTS = {
     "bundle": (get("/v1/results/{a}/bundle.zip"), {200}),
     "compare": (get("/v1/compare?a={a}&b={b}"), {200}),
     "materials": (get("/v1/materials?q=s"), {200}),
+    "page": (get("/v1/materials?limit=2"), {200}),
     "material": (get("/v1/materials/sponge"), {200}),
     "pretty": (get("/v1/materials/sponge?pretty=1"), {200}),
     "history": (get("/v1/materials/sponge/history"), {200}),

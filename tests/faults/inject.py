@@ -49,9 +49,10 @@ def is_temporary(job):
     return job["status"] == "failed" and job["problem"]["status"] in (500, 503, 507)
 
 
-def decoded(reply):
-    """Without memory to pack it an answer is sent as it is."""
-    return gzip.decompress(reply.body) if reply.headers.get("content-encoding") == "gzip" else reply.body
+def content(reply):
+    """The body, and where the next page is. Without memory to pack it an answer is sent as it is."""
+    is_packed = reply.headers.get("content-encoding") == "gzip"
+    return gzip.decompress(reply.body) if is_packed else reply.body, reply.headers.get("link")
 
 
 def has_failed(request, reply):
@@ -170,7 +171,7 @@ class Campaign:
         allowed |= {409} if request[0] == "DELETE" else {200} if request[1] == "/v1/records" else set()
         if again is None or again.status not in allowed:
             self.fault(f"{where}: answered {reply}, then {again}")
-        elif is_done and request[0] == "GET" and again.status == reply.status and decoded(again) != decoded(reply) and not VARYING.intersection(request[1].split("/")):
+        elif is_done and request[0] == "GET" and again.status == reply.status and content(again) != content(reply) and not VARYING.intersection(request[1].split("/")):
             self.fault(f"{where}: another answer than the next one")
         elif request[1] == "/v1/jobs" and again.status == 200 and again.json()["status"] != "successful":
             self.fault(f"{where}: the job again: {again}")
