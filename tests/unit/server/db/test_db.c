@@ -379,3 +379,17 @@ TEST(a_series_of_more_than_a_billion_bytes_is_not_stored) {
     db_close(db);
     assert_string_equal(detail, "body is too long to be stored; must be at most a billion bytes");
 }
+
+TEST(a_job_that_is_not_there_is_not_changed) {
+    Db *db = open_store(NULL);
+    const JobRow row = job_row("j-1", 2);
+    Removed removed;
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(db_job_update(db, &row, &problem), STATUS_NOT_FOUND);
+    assert_string_equal(problem.detail, "there is no job \"j-1\"");
+    assert_int_equal(db_job_annotate(db, &(JobNotes){.id = "j-1", .title = "T"}, NULL),
+                     STATUS_NOT_FOUND);
+    assert_int_equal(db_job_remove(db, "j-1", &removed, NULL), STATUS_NOT_FOUND);
+    db_close(db);
+}

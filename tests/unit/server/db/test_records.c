@@ -210,3 +210,12 @@ TEST(samples_that_have_not_their_digest_are_no_answer) {
     }
     scratch_remove(folder);
 }
+
+TEST(a_record_that_is_not_there_is_not_deleted) {
+    Db *db = db_make();
+    RecordUses uses;
+    problem_clear(&problem);
+    assert_int_equal(db_record_delete(db, "quake", &uses, &problem), STATUS_NOT_FOUND);
+    assert_string_equal(problem.detail, "there is no record \"quake\"");
+    db_end(db);
+}
