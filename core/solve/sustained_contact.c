@@ -186,19 +186,54 @@ static double sustained_contact_curvature(const SustainedStop *stop, const Modal
                                 state->participation_norm * at->ground_rate);
 }
 
+// What a step of any length over a stiff contact begins with.
+typedef struct StiffStart {
+    double spring, omega, drag, hard;
+    double slope;     // S'
+    double start;     // r of a mass pressed quasi-statically
+    double deviation; // from that, of (w, omega r)
+    double strayed;   // the same of N', over `hard`
+} StiffStart;
+
+// False: the contact rings too much for a step of any length.
+static bool sustained_contact_stiff_start(const SustainedStop *stop, const ModalState *state,
+                                          const DamperState *damper, const SustainedStart *from,
+                                          StiffStart *at) {
+    const double r = damper->r, w = damper->w, sign = modal_state_sign(damper->side);
+    const double k = damper->contact.stiffness, c = damper->contact.damping;
+    const double mass = damper->effective_mass;
+    at->spring = k / mass + mass * stop->bending;
+    at->omega = sqrt(at->spring);
+    at->drag = c / mass + mass * stop->coupling;
+    at->hard = k / at->omega + c;
+    const double S = from->s + mass * (stop->coupling * w + stop->bending * r);
+    at->slope = sustained_contact_rate(stop, state, damper, from->slice, from->elastic,
+                                       mass * stop->coupling * from->s) +
+                mass * stop->bending * w;
+    at->start = (S - at->drag * at->slope / at->spring) / at->spring;
+    at->deviation = hypot(w - at->slope / at->spring, at->omega * (r - at->start));
+    const double leap = from->s - (k * r + c * w) / mass; // r''
+    at->strayed = hypot(leap, at->omega * (w - at->slope / at->spring));
+    const double force = k * at->start + c * at->slope / at->spring;
+    if (!state->is_shadow &&
+        fabs(force) + at->hard * at->deviation >
+            impact_log_least_force(&state->impacts, &damper->row) &&
+        !(k * fabs(at->slope) / at->spring > at->hard * at->strayed))
+        return false;
+    return state->plan->separation == SEPARATION_ZERO_FORCE
+               ? sign * force > at->hard * at->deviation
+               : sign * at->start > at->deviation / at->omega;
+}
+
 static bool sustained_contact_stiff_lasts(const SustainedStop *stop, const ModalState *state,
                                           const DamperState *damper, const SustainedStart *from,
-                                          double h, SustainedBounds *at) {
-    const double r = damper->r, w = damper->w, sign = modal_state_sign(damper->side);
+                                          const StiffStart *stiff, double h, SustainedBounds *at) {
+    const double sign = modal_state_sign(damper->side);
     const double k = damper->contact.stiffness, c = damper->contact.damping;
     const double mass = damper->effective_mass,
                  extra = mass * fabs(damper->base_coupling) * stop->wide;
-    const double spring = k / mass + mass * stop->bending, omega = sqrt(spring);
-    const double drag = c / mass + mass * stop->coupling, hard = k / omega + c;
-    const double S = from->s + mass * (stop->coupling * w + stop->bending * r);
-    const double slope = sustained_contact_rate(stop, state, damper, from->slice, from->elastic,
-                                                mass * stop->coupling * from->s) +
-                         mass * stop->bending * w;
+    const double spring = stiff->spring, omega = stiff->omega, hard = stiff->hard,
+                 slope = stiff->slope;
     // |S''| <= bow + more |N|, and the part of it that the mass does not follow.
     const double swing = state->viscous + sqrt(state->stiff), lift = 2 * h * stop->wide; // of V
     const double more = stop->most_damped * state->viscous * stop->wide +
@@ -207,20 +242,18 @@ static bool sustained_contact_stiff_lasts(const SustainedStop *stop, const Modal
     const double bow = sustained_contact_curvature(stop, state, damper, from->slice, at, 0) +
                        extra * (stop->most_bent * at->ground + stop->most_damped * at->ground_rate);
     const double left =
-        fmin((2 * h + drag * h * h / 2) / spring + h * h / 2 / omega, h * h * h / 6);
+        fmin((2 * h + stiff->drag * h * h / 2) / spring + h * h / 2 / omega, h * h * h / 6);
     // r and N of a mass pressed quasi-statically, at both ends.
-    const double start = (S - drag * slope / spring) / spring, end = start + h * slope / spring;
+    const double start = stiff->start, end = start + h * slope / spring;
     const double forces[2] = {k * start + c * slope / spring, k * end + c * slope / spring};
-    const double deviation = hypot(w - slope / spring, omega * (r - start));
     const double largest = fmax(fabs(forces[0]), fabs(forces[1])), share = hard * left * more;
     if (!(share < 0.5))
         return false;
-    at->force = (largest + hard * (deviation + left * bow)) / (1 - share);
-    const double bent = bow + more * at->force, excited = deviation + left * bent;
+    at->force = (largest + hard * (stiff->deviation + left * bow)) / (1 - share);
+    const double bent = bow + more * at->force, excited = stiff->deviation + left * bent;
     at->size += lift * at->force;
     // A force that may be the largest so far must be at an end of the step, as N' keeps its sign.
-    const double leap = from->s - (k * r + c * w) / mass; // r''
-    const double strayed = hypot(leap, omega * (w - slope / spring)) + h * bent / omega;
+    const double strayed = stiff->strayed + h * bent / omega;
     if (!state->is_shadow && at->force > impact_log_least_force(&state->impacts, &damper->row) &&
         !(k * (fabs(slope) - h * bent) / spring > hard * strayed))
         return false;
@@ -389,17 +422,19 @@ double sustained_contact_step(SustainedContact *sustained, ModalState *state, co
     const double rate = modal_state_rate(state);
     const double omega = sqrt(alone->contact.stiffness / alone->effective_mass);
     const size_t levels = sustained_contact_levels(state);
+    StiffStart stiff;
+    const bool is_steady = sustained_contact_stiff_start(stop, state, alone, &from, &stiff);
     for (size_t i = 0; i < levels && sustained_contact_is_worth(state, sustained->length[i] * rate);
          i++) {
         const Transition *transition = &stop->levels[i];
         const double h = sustained->length[i];
         const bool is_soft = h * omega < 1;
         SustainedBounds at;
-        if (h > length * (1 + 1e-15) || transition->block == NULL)
+        if (h > length * (1 + 1e-15) || transition->block == NULL || (!is_soft && !is_steady))
             continue;
         if (!sustained_contact_find_bounds(state, slice, h, &at))
             continue;
-        if (!is_soft && !sustained_contact_stiff_lasts(stop, state, alone, &from, h, &at))
+        if (!is_soft && !sustained_contact_stiff_lasts(stop, state, alone, &from, &stiff, h, &at))
             continue;
         sustained_contact_find_gained(sustained, transition, state, alone, slice);
         if (is_soft && !sustained_contact_soft_lasts(
