@@ -119,10 +119,11 @@ static Status chirp_make(const Excitation *excitation, const Span *span, const P
     return STATUS_OK;
 }
 
-static void chirp_band(const Excitation *excitation, double band[2]) {
+static double chirp_band(const Excitation *excitation, double band[2]) {
     const ExcitationChirp *chirp = chirp_of(excitation);
     band[0] = 2 * (double)PI * fmin(chirp->start_frequency, chirp->end_frequency);
     band[1] = 2 * (double)PI * chirp_highest(chirp);
+    return fabs(chirp->amplitude);
 }
 
 static void chirp_doubt(const Excitation *excitation, const Span *span, const char *pointer,
@@ -148,7 +149,6 @@ const ExcitationKind excitation_chirp = {
     .interval = chirp_interval,
     .lasts = chirp_lasts,
     .effort = 1.5,
-    .amplitude = offsetof(ExcitationChirp, amplitude),
     .make = chirp_make,
     .doubt = chirp_doubt,
 };

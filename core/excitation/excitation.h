@@ -30,14 +30,14 @@ typedef struct ExcitationKind {
     // Validates fields that depend on the run and sets their defaults, below `pointer`. NULL: none.
     Status (*complete)(Excitation *excitation, const Span *span, const char *pointer,
                        Problem *problem);
-    // The lowest and the highest of the base's main frequencies [rad/s]. NULL: unknown.
-    void (*band)(const Excitation *excitation, double band[2]);
+    // The lowest and the highest of the base's main frequencies [rad/s]; returns the size of its
+    // acceleration: an amplitude, or a root mean square [m/s^2]. NULL: the base is still.
+    double (*band)(const Excitation *excitation, double band[2]);
     // Between the samples of the base [s]. NULL: the base has a closed form.
     double (*interval)(const Excitation *excitation);
     // The time of its last sample [s]. NULL: the end of the run.
     double (*lasts)(const Excitation *excitation);
-    double effort;    // cost of one sample, in solver steps
-    size_t amplitude; // offset of the double that the motion is proportional to; 0: none
+    double effort; // cost of one sample, in solver steps
     // The motion in closed form. NULL, and no make(): the base is still.
     Base (*form)(const Excitation *excitation);
     // Makes the samples of the motion over span->duration into an empty base, which the caller
@@ -115,9 +115,8 @@ static inline const ExcitationKind *excitation_kind(const Excitation *excitation
 
 // Whether the base never moves.
 static inline bool excitation_is_still(const Excitation *excitation) {
-    const size_t at = excitation_kind(excitation)->amplitude;
-    return excitation_kind(excitation) == &excitation_free ||
-           (at != 0 && *(const double *)(const void *)((const char *)excitation + at) == 0);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    return kind->band == NULL || kind->band(excitation, (double[2]){0}) == 0;
 }
 
 #endif

@@ -63,8 +63,9 @@ static Base half_sine_form(const Excitation *excitation) {
                   .piece_count = 2};
 }
 
-static void pulse_band(const Excitation *excitation, double band[2]) {
+static double pulse_band(const Excitation *excitation, double band[2]) {
     band[0] = band[1] = 3.14159265358979323846 / pulse_of(excitation)->length;
+    return fabs(pulse_of(excitation)->amplitude);
 }
 
 const ExcitationKind excitation_half_sine = {
@@ -72,7 +73,6 @@ const ExcitationKind excitation_half_sine = {
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
     .band = pulse_band,
-    .amplitude = offsetof(ExcitationPulse, amplitude),
     .form = half_sine_form,
     .doubt = pulse_doubt,
 };
@@ -94,7 +94,6 @@ const ExcitationKind excitation_triangular = {
              sizeof(ExcitationPulse)},
     .complete = pulse_complete,
     .band = pulse_band,
-    .amplitude = offsetof(ExcitationPulse, amplitude),
     .form = triangular_form,
     .doubt = pulse_doubt,
 };

@@ -214,9 +214,10 @@ static double random_interval(const Excitation *excitation) {
     return 1 / random_of(excitation)->rate;
 }
 
-static void random_band(const Excitation *excitation, double band[2]) {
+static double random_band(const Excitation *excitation, double band[2]) {
     for (int i = 0; i < 2; i++)
         band[i] = 2 * PI * random_of(excitation)->band.at[i];
+    return random_of(excitation)->rms;
 }
 
 const ExcitationKind excitation_random = {
@@ -228,6 +229,5 @@ const ExcitationKind excitation_random = {
     .band = random_band,
     .interval = random_interval,
     .effort = 0.06,
-    .amplitude = offsetof(ExcitationRandom, rms),
     .make = random_make,
 };

@@ -220,17 +220,21 @@ static double record_lasts(const Excitation *excitation) {
 }
 
 // The rate of a sine whose samples differ as much from each other as these do.
-static void record_band(const Excitation *excitation, double band[2]) {
+static double record_band(const Excitation *excitation, double band[2]) {
     const ExcitationRecord *record = record_of(excitation);
     const Reals *samples = record_samples(record);
-    double squares = 0, changes = 0;
-    for (size_t i = 1; i < samples->count; i++) {
-        const double change = samples->at[i] - samples->at[i - 1];
-        squares += samples->at[i] * samples->at[i];
+    double peak = 0, squares = 0, changes = 0;
+    for (size_t i = 0; i < samples->count; i++)
+        peak = fmax(peak, fabs(samples->at[i]));
+    for (size_t i = 0; i < samples->count && peak > 0; i++) {
+        const double now = samples->at[i] / peak;
+        const double change = now - (i > 0 ? samples->at[i - 1] / peak : 0);
+        squares += now * now;
         changes += change * change;
     }
     band[0] = 0;
-    band[1] = squares > 0 ? sqrt(3 * changes / squares) / record_interval(record) : 0;
+    band[1] = peak > 0 ? sqrt(3 * changes / squares) / record_interval(record) : 0;
+    return peak > 0 ? fabs(record->scale) * peak * sqrt(squares / (double)samples->count) : 0;
 }
 
 const ExcitationKind excitation_record = {

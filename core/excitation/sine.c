@@ -55,8 +55,9 @@ static Base sine_form(const Excitation *excitation) {
     return (Base){.form = BASE_SINE, .amplitude = sine_amplitude(sine), .omega = sine_omega(sine)};
 }
 
-static void sine_band(const Excitation *excitation, double band[2]) {
+static double sine_band(const Excitation *excitation, double band[2]) {
     band[0] = band[1] = sine_omega(sine_of(excitation));
+    return fabs(sine_amplitude(sine_of(excitation)));
 }
 
 static void sine_doubt(const Excitation *excitation, const Span *span, const char *pointer,
@@ -69,7 +70,6 @@ const ExcitationKind excitation_sine = {
              sizeof(ExcitationSine)},
     .complete = sine_complete,
     .band = sine_band,
-    .amplitude = offsetof(ExcitationSine, amplitude),
     .form = sine_form,
     .doubt = sine_doubt,
 };

@@ -8,12 +8,12 @@ static const double TURN = 6.28318530717958647693;
 
 // Steps of the engine for one mass: a sample, a Taylor step, and an impact with the flight before
 // and after it.
-static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, IMPACT = 50;
+static const double SAMPLE = 0.08, SAMPLE_NEAR_STOPS = 0.15, SAMPLE_OF_PULSE = 3.3, IMPACT = 50;
 // A value of a channel: 1 ns a byte for memory that is new to the process, and its sum over modes.
 static const double VALUE = 0.25, VALUE_MODE = 0.04;
-// CPU time of a step that the solvers count, over SOLVER_STEP: exact, exact with a power law, and
-// solvers that step. Measured by tests/bench/bench_cost.c.
-static const double EXACT_STEP = 0.65, POWER_STEP = 0.75, STEPPED_STEP = 1.15;
+// CPU time of a step that the solvers count, over SOLVER_STEP: exact, with several masses on
+// one storey, with a power law, and solvers that step. Measured by tests/bench/bench_cost.c.
+static const double EXACT_STEP = 0.65, MASSES_STEP = 1.2, POWER_STEP = 0.75, STEPPED_STEP = 1.15;
 static const double MODES = 2, FRAME = 100; // storeys cubed, storeys
 
 // A random base: a value of the fade, a bin, a sample in memory that is new to the process, and a
@@ -29,17 +29,23 @@ static const double NEIGHBOUR = 1.6; // a frame with dampers and its companion u
 static const double REACHING = 0.6;  // share of fast flight that no bound keeps from the stops
 
 // One mass over a sample interval too long for blocks, and pressed against a stiff stop.
-static const double LONG_SAMPLE = 8, HELD_SAMPLE = 90, HELD_RADIAN = 1.7, PIECE = 5,
-                    LONG_FLIGHT = 2;
+static const double LONG_SAMPLE = 8, HELD_BLOCK = 0.6, HELD_SAMPLE = 90, HELD_RADIAN = 1.7,
+                    PIECE = 5, LONG_FLIGHT = 2;
 static const double FEW_RADIANS = 24; // of a sample interval in contact, without the event engine
 static const double BLOCK_RADIANS = 0.125; // the longest interval for blocks (core/solve/lanes.c)
 static const double RESONANT = 1.25;       // from a band's edge to a frequency that it excites
+static const double CROSSED = 4;           // clearances that a motion crosses surely
 static const double FREE_CYCLES = 30;      // vibration lasts at least so long
 // An impulse is followed by others down to this speed, as a part of that of the motion.
 static const double SLOWEST_BOUNCE = 1e-9;
 static const double BOUNCES_MAX = 1e4;
+static const double EARLIER = 0.7; // bounces end so, over those of the largest motion
+static const double RINGING = 17;  // -log of the part of a contact's motion that is seen
 // Steps for a radian of a contact's motion, under linear and power laws.
 static const double HELD_ARCS = 1.2, HELD_POWER = 0.5;
+static const double RINGING_ARC = 2;  // with a long step tried in vain, over an arc
+static const double EASY_STEP = 0.4;  // over a sample of an impact, over others under a power law
+static const double DAMPED = 0.3;     // steps of a damped power law, per (1 - e) / e
 static const double POWER_STEPS = 12; // of a contact under a power law
 
 // A contact under a power law: the share that does not depend on the tolerance, and the digits of
@@ -103,7 +109,7 @@ static double cost_base_top(const Scene *scene) {
     const Excitation *excitation = scene_excitation(scene);
     double band[2] = {0};
     if (excitation_kind(excitation)->band != NULL)
-        excitation_kind(excitation)->band(excitation, band);
+        (void)excitation_kind(excitation)->band(excitation, band);
     return band[1];
 }
 
@@ -145,15 +151,13 @@ static void cost_motions(const Scene *scene, const StructureRates *rates, CostMo
     const double damping = rates->damping_ratio, duration = scene->duration;
     const double own = fmax(rates->slowest, 1 / duration), start = fmin(rates->slowest / own, 1);
     const bool is_driven = kind->interval != NULL || kind == &excitation_sine;
-    double amplitude = 0, base = kind == &excitation_free ? 0 : 1, band[2] = {0};
+    double amplitude = 0, base = 0, band[2] = {0};
     for (size_t i = 0; i < excitation->displacement.count; i++)
         amplitude = fmax(amplitude, fabs(excitation->displacement.at[i]));
     for (size_t i = 0; i < excitation->velocity.count; i++)
         amplitude = fmax(amplitude, fabs(excitation->velocity.at[i]) / own);
-    if (kind->amplitude != 0)
-        base = fabs(*(const double *)(const void *)((const char *)excitation + kind->amplitude));
     if (kind->band != NULL)
-        kind->band(excitation, band);
+        base = kind->band(excitation, band);
     // The root mean square of its frequencies.
     const double pace = sqrt((band[0] * band[0] + band[0] * band[1] + band[1] * band[1]) / 3);
     double gain = own / fmax(pace, own);
@@ -175,64 +179,101 @@ static void cost_motions(const Scene *scene, const StructureRates *rates, CostMo
                           : (CostMotion){0};
 }
 
+// The part of an irregular base that is just slow enough to push a mass through this clearance: of
+// a flat band, X = a sqrt(w / width) / w^2.
+static CostMotion cost_slow_motion(const Scene *scene, double clearance) {
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    double band[2];
+    if (kind != &excitation_random && kind != &excitation_record)
+        return (CostMotion){0};
+    const double density = kind->band(excitation, band) / sqrt(band[1] - band[0]);
+    const double rate = fmin(pow(density / (CROSSED * clearance), 2. / 3), band[1]);
+    return rate > fmax(band[0], 1 / scene->duration)
+               ? (CostMotion){density / pow(rate, 1.5), rate,
+                              scene->duration * sqrt(rate / (band[1] - band[0]))}
+               : (CostMotion){0};
+}
+
 // Work of contacts.
 typedef struct CostContacts {
     double impacts; // of all masses
-    double held;    // time in contact, of the mass that is in contact longest [s]
-    double radians; // of a contact's motion, of the mass with the most
+    // Of the mass with the most:
+    double pressed; // time pressed against a stop [s]
+    double touched; // time of impacts [s]
+    double radians; // of the contact's motion
+    double ringing; // of these, until what is left of the approach is below rounding
 } CostContacts;
 
 // A mass against the stop that pushes it leaves when the motion X sin(p) slows down, crosses to the
 // other stop, where X (p - sin(p)) = 2 c, and bounces there until it rests: all in phases p, of
 // which half a cycle has PI. Speeds are relative to that of the motion, whose acceleration pushes.
-static void cost_add_contact(const Damper *damper, Side side, bool is_impulse,
-                             const CostMotion *motion, CostContacts *work) {
+static CostContacts cost_contact(const Damper *damper, Side side, ContactForm form,
+                                 const CostMotion *motion) {
     const Buffer *buffer = damper_buffer(damper, side);
     const double half = TURN / 2, e = fmin(fmax(buffer->restitution, 1e-3), 1 - 1e-6);
     const double crossing = cbrt(12 * damper->clearance / motion->amplitude);
     if (!(motion->amplitude > 0) || !(motion->rate > 0) || crossing > 2 * half)
-        return;
-    const double contact = is_impulse                 ? 0
+        return (CostContacts){0};
+    const double contact = form == CONTACT_IMPULSIVE  ? 0
                            : buffer->contact_time > 0 ? half / buffer->contact_time
                            : buffer->stiffness > 0    ? sqrt(buffer->stiffness / damper->mass)
                                                       : 0;
-    const double speed = fmin(crossing * crossing / 2, 2);     // of approach
-    const double first = 2 * speed * e, all = first / (1 - e); // bounces: the first one, all
+    const double speed = fmin(crossing * crossing / 2, 2);               // of approach
+    const double first = 2 * speed * e, all = EARLIER * first / (1 - e); // time of bounces
     const double room = fmax(half - crossing, 0);
     const double slowest = contact > 0 ? motion->rate / contact : SLOWEST_BOUNCE;
     double bounces = speed > slowest ? log(speed / slowest) / -log(e) : 0;
     if (all > room)
         bounces = fmin(bounces, first > 0 ? log(1 - room / all) / log(e) : 0);
-    const double held = fmax(room - all, 0) / half * motion->lasts;
     const double halves = motion->rate * motion->lasts / half;
-    work->impacts = halves * (1 + fmin(bounces, BOUNCES_MAX)) / 2;
-    work->held = held;
-    work->radians = (held + work->impacts * (contact > 0 ? half / contact : 0)) * contact;
+    const double impacts = halves * (1 + fmin(bounces, BOUNCES_MAX)) / 2;
+    const double pressed = fmax(room - all, 0) / half * motion->lasts;
+    const double touched = contact > 0 ? impacts * half / contact : 0;
+    const double damped = form == CONTACT_POWER ? 1 + DAMPED * (1 / e - 1) : 1;
+    return (CostContacts){.impacts = 2 * impacts,
+                          .pressed = pressed,
+                          .touched = touched,
+                          .radians = (pressed + touched) * contact * damped,
+                          .ringing = halves * half * RINGING / -log(e)};
 }
 
 static CostContacts cost_contacts(const Simulation *simulation, const StructureRates *rates) {
     const Scene *scene = &simulation->scene;
-    const bool is_impulse = simulation_law(simulation)->form == CONTACT_IMPULSIVE;
-    CostMotion motions[2];
+    const ContactForm form = simulation_law(simulation)->form;
+    CostMotion motions[3];
     CostContacts sum = {0};
     cost_motions(scene, rates, motions);
     // Masses on a frame respond to its higher modes too.
     const double modes = sqrt((double)structure_storeys(scene_structure(scene)));
     for (size_t i = 0; i < scene->dampers.count; i++) {
-        CostContacts most = {0};
-        for (size_t k = 0; k < 4; k++) {
-            CostContacts one = {0};
-            cost_add_contact(&scene->dampers.at[i], (Side)(k % 2), is_impulse, &motions[k / 2],
-                             &one);
-            most.impacts = fmax(most.impacts, 2 * one.impacts);
-            most.held = fmax(most.held, one.held);
-            most.radians = fmax(most.radians, one.radians);
+        const Damper *damper = &scene->dampers.at[i];
+        double impacts = 0, radians = 0;
+        motions[2] = cost_slow_motion(scene, damper->clearance);
+        for (size_t k = 0; k < 2 * COUNT(motions); k++) {
+            const CostContacts one = cost_contact(damper, (Side)(k % 2), form, &motions[k / 2]);
+            impacts = fmax(impacts, one.impacts);
+            radians = fmax(radians, one.radians);
+            sum.pressed = fmax(sum.pressed, one.pressed);
+            sum.touched = fmax(sum.touched, one.touched);
+            sum.ringing = fmax(sum.ringing, one.ringing);
         }
-        sum.impacts += modes * most.impacts;
-        sum.held = fmax(sum.held, most.held);
-        sum.radians = fmax(sum.radians, most.radians);
+        sum.impacts += modes * impacts;
+        sum.radians = hypot(sum.radians, radians); // steps are shared, but masses excite others
     }
     return sum;
+}
+
+// The share of the run during which a pulse acts.
+static double cost_pulse(const Simulation *simulation) {
+    const Scene *scene = &simulation->scene;
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    const Base base = kind->form != NULL ? kind->form(excitation) : (Base){0};
+    if (base.form != BASE_PIECES)
+        return 0;
+    const double end = fmin(base.pieces[base.piece_count - 1].time, scene->duration);
+    return fmax(end - base.pieces[0].time, 0) / scene->duration;
 }
 
 // plan_is_single() without a plan.
@@ -254,9 +295,11 @@ static bool cost_is_single(const Scene *scene) {
 double cost_step(const Simulation *simulation) {
     if (simulation_solver(simulation)->cost != NULL)
         return STEPPED_STEP;
-    return simulation->scene.dampers.count > 0 && simulation_law(simulation)->form == CONTACT_POWER
-               ? POWER_STEP
-               : EXACT_STEP;
+    const size_t dampers = simulation->scene.dampers.count;
+    if (dampers > 0 && simulation_law(simulation)->form == CONTACT_POWER)
+        return POWER_STEP;
+    return dampers > 1 && structure_storeys(scene_structure(&simulation->scene)) == 1 ? MASSES_STEP
+                                                                                      : EXACT_STEP;
 }
 
 // Steps that the exact solver counts.
@@ -268,7 +311,10 @@ static double cost_exact_steps(const Simulation *simulation, const StructureRate
                  m = scene->dampers.count;
     const bool is_coupled = n > 1 && isnan(structure->damping_ratio);
     const double samples = (double)scene_sample_count(scene), rate = scene->sample_rate;
-    const double held = work->held * rate, fast = cost_fastest(scene, rates) / rate; // in samples
+    const double fast = cost_fastest(scene, rates) / rate; // radians of a sample
+    // Intervals between samples and kinks in which a mass is pressed.
+    const double kinks = cost_is_kinked(simulation) ? 1 / simulation_base_interval(simulation) : 0;
+    const double held = work->pressed * (rate + kinks);
     const ContactForm form = simulation_law(simulation)->form;
     double arcs = cost_flight_arcs(simulation, rates);
     *is_fast = arcs > samples;
@@ -281,15 +327,18 @@ static double cost_exact_steps(const Simulation *simulation, const StructureRate
                                          : (m == 0 ? LONG_FLIGHT * flight : LONG_SAMPLE);
         const double stiff = held > 0 ? work->radians / held : 0; // radians of a sample in contact
         const double pressed = form == CONTACT_IMPULSIVE ? HELD_SAMPLE
-                               : stiff < 1               ? 0
+                               : stiff < 1               ? HELD_BLOCK
                                : stiff < FEW_RADIANS     ? 2 * PIECE
                                                          : HELD_SAMPLE * (1 + HELD_RADIAN * fast);
-        return samples * sample + held * pressed + (m > 0 || has_blocks ? PIECE : arc) * arcs +
-               IMPACT * work->impacts;
+        const double pulse = has_blocks ? cost_pulse(simulation) : 0;
+        return samples * (sample + pulse * SAMPLE_OF_PULSE) + held * pressed +
+               (m > 0 || has_blocks ? PIECE : arc) * arcs + IMPACT * work->impacts;
     }
-    // One mass in contact has a closed form for each sample interval.
+    // One mass in contact has a closed form for an interval in which it does not ring.
+    const double closed = RINGING_ARC * HELD_ARCS * work->ringing +
+                          HELD_SAMPLE / arc * (1 + HELD_RADIAN * fast) * held;
     if (form == CONTACT_LINEAR)
-        arcs += fmin(HELD_ARCS * work->radians, m == 1 ? HELD_SAMPLE / arc * held : INFINITY);
+        arcs += fmax(fmin(HELD_ARCS * work->radians, m == 1 ? closed : INFINITY), held);
     else if (form == CONTACT_IMPULSIVE)
         arcs += held;
     const double digits = -log10(exact_tolerance(simulation_settings(simulation)));
@@ -298,7 +347,9 @@ static double cost_exact_steps(const Simulation *simulation, const StructureRate
                                      (EASY + (1 - EASY) * digits / DIGITS)
                            : form == CONTACT_IMPULSIVE ? BLOW_ARCS * arc
                                                        : FRAME_ARCS * arc;
-    const double steps = form == CONTACT_POWER ? held + HELD_POWER * work->radians : 0;
+    const double touched = fmin(work->touched * rate, samples); // samples
+    const double steps =
+        form == CONTACT_POWER ? EASY_STEP * touched + held + HELD_POWER * work->radians : 0;
     return (m > 0 ? NEIGHBOUR : 1) *
            (steps * step_work_steps(STEP_WORK_POWER, n, m, is_coupled) / POWER_STEPS +
             samples * flight + arcs * arc + work->impacts * (contact + 2 * event + 2 * arc));
@@ -329,6 +380,7 @@ static double cost_own_steps(const Simulation *simulation, const CostContacts *w
     const SolverDemand demand = {.base_interval = simulation_base_interval(simulation),
                                  .base_rate = cost_base_rate(&simulation->scene),
                                  .impacts = work->impacts,
+                                 .pressed = work->pressed,
                                  .radians = work->radians};
     const double steps = solver->cost(solver, simulation_settings(simulation), &demand, plan);
     plan_free(plan);

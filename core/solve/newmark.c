@@ -204,7 +204,8 @@ static const Stepper newmark_stepper = {.order = 2,
                                         .between = "it is of order 2",
                                         .make = newmark_make,
                                         .step = newmark_step,
-                                        .cost = newmark_step_cost};
+                                        .cost = newmark_step_cost,
+                                        .equations = 0.03};
 
 const Solver solver_newmark = {
     .kind = {"newmark",

@@ -183,7 +183,8 @@ static const Stepper precise_stepper = {.order = 2, // with a base that is not l
                                         .make = precise_make,
                                         .step = precise_step,
                                         .clear = precise_clear,
-                                        .cost = precise_step_cost};
+                                        .cost = precise_step_cost,
+                                        .is_by_contacts = true};
 
 const Solver solver_precise = {
     .kind = {"precise",

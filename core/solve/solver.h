@@ -101,6 +101,7 @@ typedef struct SolverDemand {
     double base_interval; // of a base known by samples, else 0 [s]
     double base_rate;     // of a base in closed form [rad/s]; 0: slow
     double impacts;       // of all masses
+    double pressed;       // time that the mass pressed longest is pressed against a stop [s]
     double radians;       // of the fastest motion in contacts
 } SolverDemand;
 

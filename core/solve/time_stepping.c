@@ -466,7 +466,11 @@ double time_stepping_cost(const Solver *solver, const Accuracy *accuracy,
     const StepChoice choice = time_stepping_choose(plan, accuracy, demand->base_interval);
     const double steps = choice.share * plan->duration * plan->sample_rate;
     const double companion = choice.share == choice.kinks && choice.kinks > 1 ? 2 : 0.5;
-    return (1 + companion) * each * steps + 2 * setup;
+    const double m = (double)plan->damper_count;
+    const double equations =
+        solver->stepper->equations * m * m * m * demand->pressed / plan->duration;
+    const double sets = solver->stepper->is_by_contacts ? fmin(demand->impacts, pow(3, m)) : 0;
+    return (1 + companion) * (each + equations) * steps + (2 + sets) * setup;
 }
 
 typedef struct Pair {

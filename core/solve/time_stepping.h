@@ -37,6 +37,8 @@ typedef struct Stepper {
     void (*clear)(TimeStepping *stepping); // what `method` refers to; NULL: nothing
     // Solver steps that a step costs; *setup is the cost of the tables.
     double (*cost)(size_t modes, size_t dampers, bool is_coupled, double *setup);
+    double equations;    // of contacts in a step: what they cost, per dampers^3
+    bool is_by_contacts; // each set of contacts has tables of its own
 } Stepper;
 
 struct TimeStepping {

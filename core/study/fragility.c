@@ -12,7 +12,7 @@
 #include "core/base/json_pointer.h"
 #include "core/excitation/response_spectrum.h"
 
-enum { COST_RECORDS = 16, NAMES_SHOWN = 3 };
+enum { COST_RUNS = 16, NAMES_SHOWN = 3 };
 
 static const double oscillator_step = 0.35; // CPU of one, in solver steps
 static const char *const fragility_measure_names[] = {"pga", NULL};
@@ -222,11 +222,16 @@ typedef struct FragilityWork {
     Simulation base;
 } FragilityWork;
 
-static Status fragility_scene_of(const void *of, size_t record, const SimulationLimits *limits,
+// As if each level were a peak acceleration: its record is not measured yet.
+static Status fragility_scene_of(const void *of, size_t run, const SimulationLimits *limits,
                                  Simulation *scene) {
     const FragilityWork *work = of;
-    return fragility_make_scene(&work->base, &work->study->records.at[record], 1, limits, scene,
-                                NULL);
+    const Reals *levels = &work->study->levels.values;
+    const size_t record = run / levels->count;
+    return fragility_make_scene(&work->base, &work->study->records.at[record],
+                                levels->at[run % levels->count] /
+                                    fragility_record(work->study, record)->peak,
+                                limits, scene, NULL);
 }
 
 // The time to measure the records counts too.
@@ -237,10 +242,10 @@ static Status fragility_cost(const void *request, const Simulation *simulation,
     *steps = 0;
     Status status = fragility_base(study, simulation, &work.base);
     if (status == STATUS_OK)
-        status = study_sample_cost(fragility_scene_of, &work, study->records.count, COST_RECORDS,
+        status = study_sample_cost(fragility_scene_of, &work,
+                                   study->records.count * study->levels.values.count, COST_RUNS,
                                    limits, steps);
     simulation_clear(&work.base);
-    *steps *= (double)study->levels.values.count;
     for (size_t i = 0; i < study->records.count && !isnan(study->intensity.period); i++) {
         const NamedRecord *record = fragility_record(study, i);
         *steps +=

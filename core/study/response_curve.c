@@ -30,6 +30,7 @@ enum {
 
 static const double CURVE_STEP = 0.02, CURVE_STEP_MIN = 1e-4, CURVE_STEP_MAX = 0.05;
 static const double CURVE_PRECISION = 1e-10;
+static const double ENGINE_COST = 2; // of a cycle by the event engine alone, over that of a run
 static const double CURVE_DIFFERENCE = 1e-7; // of the value, over the axis's range
 static const double CURVE_JUMP = 0.5;        // between points: another branch
 static const double CURVE_MARGIN = 1e-9;     // of the largest multiplier below 1, if stable
@@ -214,7 +215,7 @@ static Status curve_cost(const void *request, const Simulation *simulation,
     AccuracyExact exact = {{{&solver_exact.kind}, modes}, (double)NAN};
     Simulation view = *simulation; // borrows all but the solver
     view.accuracy = &exact.accuracy.variant;
-    const double second = simulation_cost(&view).steps / simulation->scene.duration;
+    const double second = ENGINE_COST * simulation_cost(&view).steps / simulation->scene.duration;
     // Mean length of a cycle over the points.
     double period = 0;
     for (size_t i = 0; i < study->axis.count; i++) {

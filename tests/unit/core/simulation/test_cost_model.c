@@ -16,6 +16,8 @@ static Problem told;
 #define RANDOM "\"excitation\": {\"kind\": \"random\", \"band\": [0, 15], \"rms\": 1}"
 #define NO_PSD "\"output\": {\"psd\": null}"
 
+#define PULSE "\"excitation\": {\"kind\": \"triangular\", \"amplitude\": 5, \"length\": 25}"
+
 static Cost cost_of(const char *members, double duration, double sample_rate) {
     Simulation simulation;
     document_pass(&simulation, members);
@@ -39,6 +41,14 @@ TEST(work_counted_is_about_what_was_predicted) {
         SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"newmark\"}",
         SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"accuracy\": {\"solver\": \"adaptive\"}",
         SDOF "," DAMPER "," RANDOM "," NO_PSD ", \"contact\": {\"model\": \"hunt_crossley\"}",
+        // Pieces under a pulse, in flight and in contact; soft contacts, which last for many
+        // samples; a contact that rings, then is pressed.
+        SDOF "," DAMPER "," PULSE "," NO_PSD,
+        SDOF "," HELD "," PULSE "," NO_PSD,
+        SDOF ",\"dampers\": [{\"mass\": 0.1, \"clearance\": 0.0001, \"buffer\": "
+             "{\"restitution\": 1, \"contact_time\": 0.2}}]," RANDOM "," NO_PSD
+             ", \"contact\": {\"model\": \"hertz\"}",
+        SDOF "," HELD "," PULSE "," NO_PSD ", \"contact\": {\"separation\": \"zero_force\"}",
         "\"structure\": {\"kind\": \"frame\", \"masses\": [9, 9, 9], \"stiffnesses\": [9000, "
         "9000, 9000], \"damping_ratio\": 0.02}," DAMPER "," RANDOM "," NO_PSD,
     };
@@ -58,6 +68,27 @@ TEST(work_counted_is_about_what_was_predicted) {
         outcome_unref(outcome);
         simulation_clear(&simulation);
     }
+}
+
+#define MASS                                                                                       \
+    "{\"mass\": 0.1, \"clearance\": 0, \"buffer\": {\"restitution\": 0.5, \"contact_time\": "      \
+    "0.01}}"
+#define EIGHT                                                                                      \
+    "\"dampers\": [" MASS "," MASS "," MASS "," MASS "," MASS "," MASS "," MASS "," MASS "]"
+
+// Newmark's step solves equations of the contact forces, a table of the precise solver belongs to
+// one set of contacts.
+TEST(masses_in_contact_cost_what_the_solver_does_about_them) {
+    static const char scene[] = SDOF "," EIGHT "," PULSE "," NO_PSD ", \"accuracy\": {\"solver\": ";
+    char text[sizeof scene + 100];
+    double steps[3];
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(text, sizeof text, "%s\"%s\", \"step\": 0.001}", scene,
+                 (const char *const[]){"rk4", "newmark", "precise"}[i]);
+        steps[i] = cost_of(text, 30, 1000).steps;
+    }
+    assert_true(steps[1] > 2 * steps[0] && steps[1] < 10 * steps[0]);
+    assert_true(steps[2] > 1.2 * steps[0] && steps[2] < 10 * steps[0]);
 }
 
 TEST(memory_predicted_holds_series_hidden_columns_and_base) {
