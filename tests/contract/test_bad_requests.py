@@ -118,6 +118,16 @@ def test_bodies_over_the_limit():
             connection.request("POST", "/v1/jobs", body=chunks, headers=JSON_TYPE, encode_chunked=True)
             assert connection.getresponse().status == 413
             connection.close()
+        # What goes on beyond four times the limit is cut off.
+        connection = http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=20)
+        endless = (8000 * b" " for _ in range(100000))
+        try:
+            connection.request("POST", "/v1/jobs", body=endless, headers=JSON_TYPE, encode_chunked=True)
+        except ConnectionError:
+            pass
+        assert sum(1 for _ in endless) > 0, "all of it was read"
+        connection.close()
+        assert daemon.request("POST", "/v1/jobs", body=text.ljust(limit), headers=JSON_TYPE).status == 200
 
 
 def test_a_refusal_is_seen_by_who_sends_much():

@@ -165,12 +165,20 @@ TEST(what_is_no_address_is_refused_with_the_reason) {
     static const struct {
         const char *text;
         Status status;
-    } bad[] = {{"example.org:80", STATUS_USAGE},  {"1.2.3:80", STATUS_USAGE},
-               {"[127.0.0.1]:80", STATUS_USAGE},  {"127.0.0.1", STATUS_USAGE},
-               {"127.0.0.1:65536", STATUS_USAGE}, {"::1:80", STATUS_USAGE},
-               {"localhost:http", STATUS_USAGE},  {"", STATUS_USAGE},
-               {"127.0.0.1:", STATUS_USAGE},      {"127.0.0.1:-1", STATUS_USAGE},
-               {"[::1:80", STATUS_USAGE},         {"[]:80", STATUS_USAGE}};
+    } bad[] = {
+        {"example.org:80", STATUS_USAGE},
+        {"1.2.3:80", STATUS_USAGE},
+        {"[127.0.0.1]:80", STATUS_USAGE},
+        {"127.0.0.1", STATUS_USAGE},
+        {"127.0.0.1:65536", STATUS_USAGE},
+        {"::1:80", STATUS_USAGE},
+        {"localhost:http", STATUS_USAGE},
+        {"", STATUS_USAGE},
+        {"127.0.0.1:", STATUS_USAGE},
+        {"127.0.0.1:-1", STATUS_USAGE},
+        {"[::1:80", STATUS_USAGE},
+        {"[]:80", STATUS_USAGE},
+        {"1234567890123456789012345678901234567890123456789012345678901234:80", STATUS_USAGE}};
     for (size_t i = 0; i < COUNT(bad); i++) {
         Address address;
         Problem problem;
