@@ -29,8 +29,8 @@ static const double NEIGHBOUR = 1.6; // a frame with dampers and its companion u
 static const double REACHING = 0.6;  // share of fast flight that no bound keeps from the stops
 
 // One mass over a sample interval too long for blocks, and pressed against a stiff stop.
-static const double LONG_SAMPLE = 8, HELD_BLOCK = 0.6, HELD_SAMPLE = 90, HELD_RADIAN = 1.7,
-                    PIECE = 5, LONG_FLIGHT = 2;
+static const double LONG_SAMPLE = 8, HELD_BLOCK = 0.6, HELD_PIECES = 16, HELD_SAMPLE = 90,
+                    HELD_RADIAN = 1.7, PIECE = 5, LONG_FLIGHT = 2;
 static const double FEW_RADIANS = 24; // of a sample interval in contact, without the event engine
 static const double BLOCK_RADIANS = 0.125; // the longest interval for blocks (core/solve/lanes.c)
 static const double RESONANT = 1.25;       // from a band's edge to a frequency that it excites
@@ -179,8 +179,8 @@ static void cost_motions(const Scene *scene, const StructureRates *rates, CostMo
                           : (CostMotion){0};
 }
 
-// The part of an irregular base that is just slow enough to push a mass through this clearance: of
-// a flat band, X = a sqrt(w / width) / w^2.
+// The part of an irregular base that is just slow enough to push a mass through this clearance (of
+// a flat band, X = a sqrt(w / width) / w^2), for its share of the acceleration.
 static CostMotion cost_slow_motion(const Scene *scene, double clearance) {
     const Excitation *excitation = scene_excitation(scene);
     const ExcitationKind *kind = excitation_kind(excitation);
@@ -328,7 +328,7 @@ static double cost_exact_steps(const Simulation *simulation, const StructureRate
         const double stiff = held > 0 ? work->radians / held : 0; // radians of a sample in contact
         const double pressed = form == CONTACT_IMPULSIVE ? HELD_SAMPLE
                                : stiff < 1               ? HELD_BLOCK
-                               : stiff < FEW_RADIANS     ? 2 * PIECE
+                               : stiff < FEW_RADIANS     ? HELD_PIECES
                                                          : HELD_SAMPLE * (1 + HELD_RADIAN * fast);
         const double pulse = has_blocks ? cost_pulse(simulation) : 0;
         return samples * (sample + pulse * SAMPLE_OF_PULSE) + held * pressed +
