@@ -110,8 +110,8 @@ static SlurmFacts cluster_facts(Cluster *cluster) {
     return facts;
 }
 
-size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seconds) {
-    if (cluster == NULL || seconds < cluster->settings->seconds ||
+static size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seconds) {
+    if (seconds < cluster->settings->seconds ||
         (kind != &study_sweep && kind != &study_ensemble && kind != &study_fragility))
         return 0;
     const size_t slots = cluster_facts(cluster).slots;
@@ -120,7 +120,7 @@ size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seconds) {
 
 // --- a study ---
 
-void cluster_study_free(ClusterStudy *study) {
+static void cluster_study_free(ClusterStudy *study) {
     if (study == NULL)
         return;
     for (size_t i = 0; study->chunks != NULL && i < study->plan.chunks; i++)
@@ -149,7 +149,7 @@ static Status study_write(ClusterStudy *study, Problem *problem) {
     return status;
 }
 
-Status cluster_prepare(StudyRun *run, size_t slots, Problem *problem) {
+static Status cluster_prepare(StudyRun *run, size_t slots, Problem *problem) {
     Cluster *cluster = run->manager->cluster;
     ClusterStudy *study = run->cluster = calloc(1, sizeof *study);
     if (study == NULL)
@@ -185,7 +185,7 @@ Status cluster_prepare(StudyRun *run, size_t slots, Problem *problem) {
     return STATUS_OK;
 }
 
-void cluster_take(StudyRun *run) {
+static void cluster_take(StudyRun *run) {
     ClusterStudy *study = run->cluster;
     Cluster *cluster = study->cluster;
     run->task->workers++;
@@ -695,9 +695,12 @@ void cluster_close(Cluster *cluster) {
 }
 
 Status cluster_open(JobManager *manager, Problem *problem) {
+    static const StudyExecutor executor = {cluster_slots, cluster_prepare, cluster_take,
+                                           cluster_study_free};
     const ClusterSettings *settings = &manager->settings.cluster;
     Cluster *cluster = manager->cluster = calloc(1, sizeof *cluster);
     struct stat facts;
+    manager->executor = &executor;
     if (cluster == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the cluster's studies");
     cluster->manager = cluster->worker.manager = manager;

@@ -145,9 +145,22 @@ typedef struct Worker {
 typedef struct Cluster Cluster;
 typedef struct ClusterStudy ClusterStudy;
 
+// What makes the members of studies elsewhere, for study.c, which cluster.c is above.
+typedef struct StudyExecutor {
+    // How many members of a study of this kind and predicted CPU time it makes at once, perhaps a
+    // guess; 0: the workers make them.
+    size_t (*slots)(Cluster *cluster, const StudyKind *kind, double seconds);
+    // Prepares a begun study, of a sweep with its chunks. STATUS_FULL, STATUS_IO: not now.
+    Status (*prepare)(struct StudyRun *run, size_t slots, Problem *problem);
+    // With the manager's lock held: takes a prepared study, with a turn of it, to its end.
+    void (*take)(struct StudyRun *run);
+    void (*free)(ClusterStudy *study); // NULL is fine
+} StudyExecutor;
+
 struct JobManager {
     Db *db;
-    Cluster *cluster; // NULL: the workers make all
+    const StudyExecutor *executor; // NULL: the workers make all
+    Cluster *cluster;
     JobManagerSettings settings;
     pthread_mutex_t lock;
     pthread_cond_t work;       // for a worker, or space for its result
@@ -268,15 +281,7 @@ void jobs_call_waiting(JobManager *manager); // all that wait try again
 // cluster.c. What runs there when the manager is closed continues, and is taken up after the next
 // start. Closed by cluster_close also after a failure.
 Status cluster_open(JobManager *manager, Problem *problem);
-void cluster_close(Cluster *cluster); // NULL is fine, as below
-// How many members of a study of this kind and predicted CPU time it makes at once, perhaps a
-// guess; 0: the workers make them.
-size_t cluster_slots(Cluster *cluster, const StudyKind *kind, double seconds);
-// Prepares a begun study, of a sweep with its chunks. STATUS_FULL, STATUS_IO: not now.
-Status cluster_prepare(struct StudyRun *run, size_t slots, Problem *problem);
-// With the manager's lock held: takes a prepared study, with a turn of it, to its end.
-void cluster_take(struct StudyRun *run);
-void cluster_study_free(ClusterStudy *study);
+void cluster_close(Cluster *cluster); // NULL is fine
 
 // resolve.c. Of a prepared request: drops the samples of its records for as long as it waits, and
 // loads them again, with a fault for each that is no longer there.

@@ -381,7 +381,8 @@ void study_run_free(StudyRun *run) {
         run->chunks = chunk->next;
         sweep_chunk_free(chunk);
     }
-    cluster_study_free(run->cluster);
+    if (run->is_clustered)
+        run->manager->executor->free(run->cluster);
     sweep_row_clear(&run->sweep);
     study_engine_close(&run->engine);
     study_free(run->work);
@@ -437,7 +438,9 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
     const StudyTools tools = {
         .limits = &settings->limits, .progress = &begin, .workspace = &worker->workspace};
     const StudyKind *kind = study_kind(inquiry->study);
-    const size_t slots = cluster_slots(manager->cluster, kind, run->task->queued.seconds);
+    const StudyExecutor *executor = manager->executor;
+    const size_t slots =
+        executor != NULL ? executor->slots(manager->cluster, kind, run->task->queued.seconds) : 0;
     run->is_sweep = kind == &study_sweep;
     run->is_clustered = slots > 0;
     TRY(study_begin(inquiry->study, &inquiry->simulation, &tools, &answer->study, &run->work,
@@ -446,7 +449,7 @@ static Status study_open(Worker *worker, StudyRun *run, StudyAnswer *answer, Pro
                           run->is_sweep ? 0 : settings->workers, problem));
     if (run->is_sweep)
         TRY(sweep_open(run, run->is_clustered ? slots : settings->workers, problem));
-    return run->is_clustered ? cluster_prepare(run, slots, problem) : STATUS_OK;
+    return run->is_clustered ? executor->prepare(run, slots, problem) : STATUS_OK;
 }
 
 Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *problem) {
@@ -470,7 +473,7 @@ Status study_start(Worker *worker, Task *task, RunResult *run_result, Problem *p
     run->next = manager->studies;
     manager->studies = run;
     if (run->is_clustered)
-        cluster_take(run);
+        manager->executor->take(run);
     study_enqueue(run);
     pthread_mutex_unlock(&manager->lock);
     return STATUS_OK;
