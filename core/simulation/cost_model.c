@@ -145,19 +145,18 @@ typedef struct CostMotion {
 } CostMotion;
 
 // The structure's own vibration, and the base's as it carries the structure along.
-static void cost_motions(const Scene *scene, const StructureRates *rates, CostMotion motions[2]) {
+static void cost_motions(const Scene *scene, const StructureRates *rates, double base,
+                         const double band[2], CostMotion motions[2]) {
     const Excitation *excitation = scene_excitation(scene);
     const ExcitationKind *kind = excitation_kind(excitation);
     const double damping = rates->damping_ratio, duration = scene->duration;
     const double own = fmax(rates->slowest, 1 / duration), start = fmin(rates->slowest / own, 1);
     const bool is_driven = kind->interval != NULL || kind == &excitation_sine;
-    double amplitude = 0, base = 0, band[2] = {0};
+    double amplitude = 0;
     for (size_t i = 0; i < excitation->displacement.count; i++)
         amplitude = fmax(amplitude, fabs(excitation->displacement.at[i]));
     for (size_t i = 0; i < excitation->velocity.count; i++)
         amplitude = fmax(amplitude, fabs(excitation->velocity.at[i]) / own);
-    if (kind->band != NULL)
-        base = kind->band(excitation, band);
     // The root mean square of its frequencies.
     const double pace = sqrt((band[0] * band[0] + band[0] * band[1] + band[1] * band[1]) / 3);
     double gain = own / fmax(pace, own);
@@ -181,13 +180,12 @@ static void cost_motions(const Scene *scene, const StructureRates *rates, CostMo
 
 // The part of an irregular base that is just slow enough to push a mass through this clearance (of
 // a flat band, X = a sqrt(w / width) / w^2), for its share of the acceleration.
-static CostMotion cost_slow_motion(const Scene *scene, double clearance) {
-    const Excitation *excitation = scene_excitation(scene);
-    const ExcitationKind *kind = excitation_kind(excitation);
-    double band[2];
+static CostMotion cost_slow_motion(const Scene *scene, double base, const double band[2],
+                                   double clearance) {
+    const ExcitationKind *kind = excitation_kind(scene_excitation(scene));
     if (kind != &excitation_random && kind != &excitation_record)
         return (CostMotion){0};
-    const double density = kind->band(excitation, band) / sqrt(band[1] - band[0]);
+    const double density = base / sqrt(band[1] - band[0]);
     const double rate = fmin(pow(density / (CROSSED * clearance), 2. / 3), band[1]);
     return rate > fmax(band[0], 1 / scene->duration)
                ? (CostMotion){density / pow(rate, 1.5), rate,
@@ -243,13 +241,19 @@ static CostContacts cost_contacts(const Simulation *simulation, const StructureR
     const ContactForm form = simulation_law(simulation)->form;
     CostMotion motions[3];
     CostContacts sum = {0};
-    cost_motions(scene, rates, motions);
+    // Once: a record looks at all of its samples.
+    const Excitation *excitation = scene_excitation(scene);
+    const ExcitationKind *kind = excitation_kind(excitation);
+    double band[2] = {0};
+    const double base =
+        scene->dampers.count > 0 && kind->band != NULL ? kind->band(excitation, band) : 0;
+    cost_motions(scene, rates, base, band, motions);
     // Masses on a frame respond to its higher modes too.
     const double modes = sqrt((double)structure_storeys(scene_structure(scene)));
     for (size_t i = 0; i < scene->dampers.count; i++) {
         const Damper *damper = &scene->dampers.at[i];
         double impacts = 0, radians = 0;
-        motions[2] = cost_slow_motion(scene, damper->clearance);
+        motions[2] = cost_slow_motion(scene, base, band, damper->clearance);
         for (size_t k = 0; k < 2 * COUNT(motions); k++) {
             const CostContacts one = cost_contact(damper, (Side)(k % 2), form, &motions[k / 2]);
             impacts = fmax(impacts, one.impacts);
