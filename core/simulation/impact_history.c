@@ -16,8 +16,6 @@
 
 enum { TIME, FORCE, PENETRATION, SPEED, COLUMNS };
 
-static const double states_bytes_max = 1e9; // columns of the run
-
 typedef struct ImpactRun {
     Simulation simulation; // with all states as channels
     Outcome *outcome;      // of the run
@@ -56,14 +54,6 @@ static Status impact_run_add_states(const Scene *scene, Output *output) {
 static Status impact_run_settle(ImpactRun *run, const Simulation *asked,
                                 const SimulationLimits *limits, const Progress *progress,
                                 Workspace *workspace, Problem *problem) {
-    const Scene *scene = &asked->scene;
-    const size_t states = 2 * (structure_storeys(scene_structure(scene)) + scene->dampers.count);
-    if ((double)states * (double)scene_sample_count(scene) * sizeof(double) > states_bytes_max)
-        return problem_set(problem, STATUS_LIMIT,
-                           "the run is too long, or has too many storeys, to show one impact in "
-                           "detail: its states would need more than %g bytes; submit a shorter "
-                           "scene that contains the impact",
-                           states_bytes_max);
     if (simulation_has_target(asked)) {
         Outcome *outcome = NULL;
         TRY(accuracy_target_run(asked, limits, progress, workspace, &run->simulation, &outcome,
@@ -73,8 +63,16 @@ static Status impact_run_settle(ImpactRun *run, const Simulation *asked,
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the scene");
     }
     run->simulation.output.impacts = true;
-    if (impact_run_add_states(scene, &run->simulation.output) != STATUS_OK)
+    if (impact_run_add_states(&asked->scene, &run->simulation.output) != STATUS_OK)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the channels");
+    const double bytes = cost_scene(&run->simulation).bytes;
+    if (limits != NULL && limits->bytes > 0 && !(bytes <= limits->bytes))
+        return problem_set(problem, STATUS_LIMIT,
+                           "the run is too long, or has too many storeys, to show one impact in "
+                           "detail: with all its states it would take about %.3g MB of memory, at "
+                           "most %.4g MB are allowed; submit a shorter scene that contains the "
+                           "impact",
+                           1e-6 * bytes, 1e-6 * limits->bytes);
     return STATUS_OK;
 }
 

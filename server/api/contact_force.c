@@ -55,6 +55,7 @@ Status request_run_resume(App *app, const Request *request, Reply *reply, const 
 // The run of one scene for one impact.
 typedef struct ForceRun {
     StudyRequest inquiry;
+    SimulationLimits limits;
     size_t number, points;
     ImpactHistory history;
     Status status;
@@ -68,11 +69,11 @@ static void force_free(void *context) {
     free(force);
 }
 
-// Without limits: the scene was within them when its result was made.
 static void force_run(void *context, const Progress *watch) {
     ForceRun *force = context;
-    force->status = impact_history_make(&force->inquiry.simulation, force->number, force->points,
-                                        NULL, watch, NULL, &force->history, &force->problem);
+    force->status =
+        impact_history_make(&force->inquiry.simulation, force->number, force->points,
+                            &force->limits, watch, NULL, &force->history, &force->problem);
 }
 
 // The scene of the result, as this engine would run it again.
@@ -157,6 +158,9 @@ Status results_force(App *app, const Request *request, Reply *reply, Problem *pr
     if (force == NULL)
         return problem_set(problem, STATUS_NO_MEMORY, "no memory for the impact");
     problem_clear(&force->problem);
+    // It lists as many impacts as the result, whatever may be listed since.
+    force->limits = *jobs_limits(app->manager);
+    force->limits.impacts = 0;
     Status status = force_read_request(request, force, problem);
     if (status == STATUS_OK)
         status = force_read_scene(app, request->parameters[0], reply, force, problem);

@@ -308,11 +308,12 @@ static void run_add_details(Report *report, const Simulation *simulation, const 
     const Impact *largest = run_largest_impact(impacts);
     if (outcome->response.series.count > 1)
         (void)run_add_chart(report, "All channels", outcome, table_stream_series, NULL, 0);
+    const SimulationLimits limits = {.bytes = SIMULATION_BYTES};
     ImpactHistory history = {.impact = {0}};
     TableStream *stream = table_stream_new(NULL);
     if (stream != NULL && largest != NULL &&
         impact_history_make(simulation, (size_t)(largest - impacts->at) + 1, IMPACT_HISTORY_POINTS,
-                            NULL, NULL, NULL, &history, NULL) == STATUS_OK &&
+                            &limits, NULL, NULL, &history, NULL) == STATUS_OK &&
         table_stream_columns(stream, &history.columns, true, NULL) == STATUS_OK) {
         Chart *chart = report_chart(report, "Largest impact, pressing is positive", 0, 0);
         if (chart != NULL)

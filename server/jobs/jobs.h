@@ -57,6 +57,8 @@ Status jobs_limit_study(const StudyRequest *request, const SimulationLimits *lim
 Status jobs_prepare_request(JobManager *manager, const char *text, size_t size,
                             const SimulationLimits *limits, StudyRequest *request,
                             Warnings *warnings, Problem *problem);
+// Of a run; the manager's.
+const SimulationLimits *jobs_limits(const JobManager *manager);
 // Counts one submission of `client` (NULL: a client without a token) against its jobs a minute:
 // STATUS_QUOTA.
 Status jobs_charge(JobManager *manager, const char *client, Problem *problem);

@@ -119,6 +119,10 @@ static Status client_enter(JobManager *manager, const char *name, QueueClient **
     return status;
 }
 
+const SimulationLimits *jobs_limits(const JobManager *manager) {
+    return &manager->settings.limits;
+}
+
 Status jobs_charge(JobManager *manager, const char *client, Problem *problem) {
     QueueClient *charged;
     return client_enter(manager, client, &charged, problem);

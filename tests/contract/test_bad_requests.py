@@ -180,6 +180,10 @@ def test_what_takes_too_long_is_refused_at_the_door():
         assert cost["cpu_seconds"] < 0.002 and 4e5 < cost["bytes"] < 1e6, cost
     with program.daemon("--max-run-bytes", "2000000") as daemon:
         problem(daemon.submit(sponge(duration=100)), 422, "/output/channels")
+        # The history of an impact needs all states.
+        job = daemon.submit(sponge(duration=60, output={"channels": [], "psd": None})).json()
+        history = daemon.get(f"/v1/results/{job['result']}/impacts/1/force.json")
+        assert history.status != 200 and "2 MB are allowed" in history.json()["detail"], history
 
 
 if __name__ == "__main__":

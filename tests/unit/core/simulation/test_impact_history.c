@@ -219,6 +219,26 @@ static void assert_refused(const Simulation *simulation, size_t number, Status e
     assert_int_equal(closeup.columns.count, 0);
 }
 
+// The run itself is within the limit; with the states of all storeys at each sample it is not.
+TEST(more_memory_than_allowed_is_refused) {
+    StudyRequest inquiry;
+    open_example("paper_free_sponge", &inquiry);
+    Simulation *simulation = &inquiry.simulation;
+    texts_clear(&simulation->output.channels);
+    simulation->scene.sample_rate = 1e5;
+    const double bytes = simulation_cost(simulation).bytes;
+    const SimulationLimits limits = {.bytes = 1.01 * bytes};
+    ImpactHistory closeup;
+    Problem problem;
+    problem_clear(&problem);
+    assert_int_equal(
+        impact_history_make(simulation, 1, 401, &limits, NULL, NULL, &closeup, &problem),
+        STATUS_LIMIT);
+    assert_non_null(strstr(problem.detail, "MB are allowed"));
+    assert_int_equal(closeup.columns.count, 0);
+    study_request_clear(&inquiry);
+}
+
 static bool never(void *context, double fraction) {
     (void)context, (void)fraction;
     return false;
