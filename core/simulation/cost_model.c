@@ -341,8 +341,12 @@ static double cost_exact_steps(const Simulation *simulation, const StructureRate
     // One mass in contact has a closed form for an interval in which it does not ring.
     const double closed = RINGING_ARC * HELD_ARCS * work->ringing +
                           HELD_SAMPLE / arc * (1 + HELD_RADIAN * fast) * held;
-    if (form == CONTACT_LINEAR)
-        arcs += fmax(fmin(HELD_ARCS * work->radians, m == 1 ? closed : INFINITY), held);
+    const double open = HELD_ARCS * work->radians;
+    // Where the structure is fast it may excite the contact for ever: something between the two.
+    if (form == CONTACT_LINEAR && m == 1 && closed < open)
+        arcs += fmax(fast < 1 ? closed : sqrt(closed * open), held);
+    else if (form == CONTACT_LINEAR)
+        arcs += fmax(open, held);
     else if (form == CONTACT_IMPULSIVE)
         arcs += held;
     const double digits = -log10(exact_tolerance(simulation_settings(simulation)));
