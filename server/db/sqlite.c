@@ -119,7 +119,8 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
     // A page that cannot be read is to SQLite one that is damaged.
     if (has_path && (code == SQLITE_NOTADB || code == SQLITE_CORRUPT) && cause == EIO)
         return report_unreadable(path, problem);
-    if (has_path && code == SQLITE_READONLY)
+    // Of a file that it tries to open in several ways SQLite forgets why the first one failed.
+    if (has_path && (code == SQLITE_READONLY || (code == SQLITE_CANTOPEN && cause == 0)))
         return problem_set(problem, status,
                            "%s failed: %s, or a file next to it, could not be opened for writing",
                            doing, path);
