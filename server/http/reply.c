@@ -14,7 +14,8 @@
 const char type_json[] = "application/json";
 static const char type_problem[] = "application/problem+json";
 static const char no_memory[] =
-    "{\"type\": \"/problems/no-memory\", \"title\": \"Out of memory\", \"status\": 503}\n";
+    "{\"type\": \"/problems/no-memory\", \"title\": \"Out of memory\", \"status\": 503, "
+    "\"detail\": \"no memory for the answer; send the request again\"}\n";
 
 const char reply_policy[] =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";

@@ -40,6 +40,11 @@ def test_an_answer_is_indented_or_refused():
     assert tried("allocations", 2, "pretty") > 40
 
 
+def test_a_list_of_faults_has_its_detail_or_is_refused():
+    """Without memory for the faults of a scene the answer is 503, and it too says why."""
+    assert tried("allocations", 1, "faulty", first=90) > 50
+
+
 def test_a_page_has_its_link_or_is_refused():
     """Without memory for the link to the next page a list is 503: without the link it would be the last page."""
     assert tried("allocations", 2, "page") > 80

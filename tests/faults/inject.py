@@ -137,7 +137,7 @@ class Campaign:
             self.outcomes["right"] += 1
         elif reply.status == 202 and request[1] == "/v1/jobs":
             self.outcomes["accepted"] += 1
-        elif reply.status in REFUSALS[self.kind] and reply.json()["detail"]:
+        elif reply.status in REFUSALS[self.kind] and reply.json().get("detail"):
             self.outcomes["refused"] += 1
         elif reply.status == 409 and request[0] == "DELETE" and is_temporary(daemon.get(request[1]).json()):
             self.outcomes["refused"] += 1  # the job that is to be cancelled has failed of the fault
