@@ -55,7 +55,7 @@ static _Atomic bool is_inside[MAX_FILES]; // by descriptor
 // Code of libraries that abort or crash when an allocation of theirs fails, by themselves: these
 // are left out.
 static const char *const fragile[] = {"libfftw3", "libsundials", "libnlopt", "liblapack",
-                                      "libblas",  "libopenblas", "libtasn1"};
+                                      "libblas",  "libopenblas", "libtasn1", "libgmp"};
 enum { FRAGILE = sizeof fragile / sizeof *fragile, MAX_RANGES = 64 };
 static struct { uintptr_t from, to; } ranges[MAX_RANGES];
 static size_t range_count;
