@@ -21,6 +21,7 @@
 #include "core/plan/plan.h"
 
 enum { EVENTS_AT_INSTANT_MAX = 1000 }; // of each damper
+enum { CHATTER_EVENTS_MAX = 10000 };   // of each damper under the impulse law
 enum { STILL_BOUNCES = 64 };
 
 static void contact_event_begin_contact(ModalState *state, size_t d, Side side) {
@@ -242,6 +243,14 @@ Status contact_event_apply(ModalState *state, const ContactEvent *event) {
     if (++state->events_at_instant > max)
         return problem_set(state->problem, STATUS_UNSTABLE,
                            "more than %zu contact events at one instant, t = %.17g s", max,
+                           modal_state_time(state));
+    // Steps far below the clock's resolution, as of a mass that a base of 1e300 m/s^2 presses to
+    // either stop in turn: the clock would stand still until a limit ends the run.
+    if (state->plan->form == CONTACT_IMPULSIVE &&
+        state->chatter_events > CHATTER_EVENTS_MAX * state->dampers)
+        return problem_set(state->problem, STATUS_UNSTABLE,
+                           "more than %zu contact events within %.3g s, t = %.17g s",
+                           CHATTER_EVENTS_MAX * state->dampers, modal_state_clock(state),
                            modal_state_time(state));
     recorder_update(state);
     switch (damper->phase) {

@@ -365,6 +365,24 @@ TEST(limits_and_cancelling_end_a_run_with_their_reason) {
     plan_free(plan);
 }
 
+// Under 1e300 m/s^2 a mass is let go and taken by its other stop within 1e-150 s, again and again.
+TEST(chatter_in_which_the_clock_stands_still_ends_a_run) {
+    const double mass = 1.35, stiffness = 865, damping = 1.092;
+    const Base base = {.form = BASE_SINE, .amplitude = 1e300, .omega = 8 * acos(-1)};
+    Plan *plan = frames_new(1, 1, 1, 100);
+    Response response = {0};
+    Problem problem;
+    frames_shear(plan, &mass, &stiffness, &damping);
+    frames_damper(plan, 0, 0, 0.1107, 0.015, 0.6, NAN);
+    plan->displacement[0] = 0.01;
+    problem_clear(&problem);
+    Run with = {.plan = plan, .base = &base, .steps_max = 1e6};
+    assert_int_equal(exact_run_engine(&with, &response, &problem), STATUS_UNSTABLE);
+    assert_non_null(strstr(problem.detail, "more than 10000 contact events within"));
+    response_clear(&response);
+    plan_free(plan);
+}
+
 // A mass that never meets its stops: the run and its neighbour take each sample once.
 TEST(the_work_of_the_neighbour_is_counted) {
     Plan *plan = frames_new(3, 1, 10, 1000);
