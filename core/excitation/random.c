@@ -100,8 +100,13 @@ static Status random_complete(Excitation *excitation, const Span *span, const ch
     Status status = STATUS_OK;
     const JsonPointer band = json_pointer_of(pointer, "band");
     const JsonPointer highest = json_pointer_at(band.at, 1);
-    if (isnan(random->rate))
+    if (isnan(random->rate)) {
         random->rate = span->sample_rate;
+        if (random->rate > 0 && random->rate < RATE_MIN) // no row checks a default
+            json_pointer_fault_real(problem, pointer, "rate", random->rate, "Hz",
+                                    "must be at least %s Hz, is the sample_rate, %s",
+                                    real_text(RATE_MIN).at, real_text(random->rate).at);
+    }
     const bool has_rate = random_check_rate(random, span, pointer, problem);
     if (!has_rate)
         status = STATUS_INVALID;

@@ -277,6 +277,20 @@ TEST(the_rate_and_the_band_are_judged_at_once) {
     assert_int_equal(problem.count, 2);
 }
 
+// No row checks a default.
+TEST(a_sample_rate_too_low_for_the_base_is_a_fault) {
+    static Problem problem;
+    ExcitationRandom random = random_with(1, 10, 1, 0, NAN);
+    const Span span = {.duration = 1, .sample_rate = 1e-12};
+    problem_clear(&problem);
+    assert_int_equal(excitation_random.complete(&random.start, &span, "/excitation", &problem),
+                     STATUS_INVALID);
+    assert_int_equal(problem.count, 1);
+    assert_string_equal(problem.faults[0].pointer, "/excitation/rate");
+    assert_string_equal(problem.faults[0].detail,
+                        "must be at least 1e-09 Hz, is the sample_rate, 1e-12");
+}
+
 TEST(the_rate_is_the_sample_rate_if_absent) {
     static Problem problem;
     ExcitationRandom random = random_with(0, 250, 1, 0, NAN);
