@@ -194,6 +194,7 @@ Status results_again(App *app, const Request *request, Reply *reply, Problem *pr
         const Submission submission = {.text = row.scene,
                                        .size = strlen(row.scene),
                                        .client = request->client,
+                                       .idempotency_key = request->idempotency_key,
                                        .is_replayed = &reply->is_replayed};
         status = submit(app, request, &submission, reply, &job, problem);
     }

@@ -85,7 +85,7 @@ def events(text):
 
 
 def test_a_key_is_done_once():
-    """Same key and body: the same job, said so; another body: 422; also after a restart, and not under dry_run."""
+    """Same key and body: the same job, said so; another body: 422; also after a restart and where a result's scene is submitted again, not under dry_run."""
     folder = tempfile.mkdtemp(prefix="impactd-jobs-")
     try:
         with program.daemon(data=folder) as daemon:
@@ -110,6 +110,11 @@ def test_a_key_is_done_once():
             again = daemon.submit(quick(1), headers={"Idempotency-Key": '"one"'})
             assert again.json()["id"] == first.json()["id"] and again.headers["idempotency-replayed"] == "true"
             assert len(pages(daemon, "/v1/jobs")) == 2
+            path = f"/v1/results/{first.json()['result']}/again"
+            once, twice = [daemon.request("POST", path, headers={"Idempotency-Key": '"three"'}) for _ in range(2)]
+            assert once.json()["id"] == twice.json()["id"] and twice.headers["idempotency-replayed"] == "true", (once, twice)
+            assert daemon.request("POST", path, headers={"Idempotency-Key": '"two"'}).status == 422
+            assert len(pages(daemon, "/v1/jobs")) == 3
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
