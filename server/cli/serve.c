@@ -237,9 +237,9 @@ static Status tokens_require(const Address *address, size_t valid, Problem *prob
     if (valid > 0)
         return STATUS_OK;
     return problem_set(problem, STATUS_FORBIDDEN,
-                       "does not listen on %s%s: there is no valid token. Create one with\n    "
-                       "impactd token create --name NAME --scopes read,submit\n(with the same "
-                       "--data DIR, if any)%s",
+                       "does not listen on %s%s: there is no valid token; create one with impactd "
+                       "token create --name NAME --scopes read,submit, and the same --data DIR if "
+                       "it is given here%s",
                        address->host, is_loopback ? " with --require-tokens" : "",
                        is_loopback ? "" : ", or listen on 127.0.0.1");
 }

@@ -245,7 +245,7 @@ def test_beyond_loopback_nothing_starts_without_a_token():
     with tempfile.TemporaryDirectory(prefix="impactd-") as data:
         for arguments in (("--listen", "0.0.0.0:0"), ("--listen", "127.0.0.1:0", "--require-tokens"), ("--listen", "[::]:0")):
             done = impactd("serve", *arguments, "--data", data)
-            assert done.returncode == 5 and "impactd token create" in done.stderr, done
+            assert done.returncode == 5 and "create one with impactd token create --name NAME --scopes read,submit, and" in done.stderr, done
         lab = token(data, "lab")
         impactd("token", "revoke", "lab", "--data", data)
         done = impactd("serve", "--listen", "0.0.0.0:0", "--data", data)
