@@ -124,6 +124,12 @@ static Status report(sqlite3 *connection, const char *doing, Problem *problem) {
         return problem_set(problem, status,
                            "%s failed: %s, or a file next to it, could not be opened for writing",
                            doing, path);
+    // Of a journal that is gone by now.
+    if (has_path && cause == 0 && sqlite3_extended_errcode(connection) == SQLITE_IOERR_FSYNC)
+        return problem_set(problem, status,
+                           "%s failed: the disk did not confirm what was written to %s; it may be "
+                           "full",
+                           doing, path);
     if (has_path && (code == SQLITE_NOTADB || code == SQLITE_CORRUPT))
         return problem_set(
             problem, status,

@@ -28,8 +28,8 @@ from control import ALLOCATIONS, KINDS, Control  # noqa: E402
 
 TIMEOUT = 60  # [s]
 # What a message says of a fault. A disk that did not answer once is not called damaged.
-WORDS = {"allocations": ("memory",), "stacks": ("memory",), "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing"),
-         "ENOSPC": ("No space", "no room", "cannot open", "could not be opened"), "short": ("",)}
+WORDS = {"allocations": ("memory",), "stacks": ("memory",), "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing", "did not confirm"),
+         "ENOSPC": ("No space", "no room", "cannot open", "could not be opened", "did not confirm"), "short": ("",)}
 SERVE = ("serve", "--listen", "127.0.0.1:0", "--workers", "1", "--data", "{}/data")
 # A study in a folder, as a cluster's tasks find it.
 SCENE = {"structure": {"kind": "sdof", "mass": 1.35, "stiffness": 865},
