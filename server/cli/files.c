@@ -17,6 +17,32 @@ const char *input_name(const char *path) {
     return strcmp(path, "-") == 0 ? "standard input" : path;
 }
 
+// The files that were read, which no output replaces.
+static struct {
+    dev_t device;
+    ino_t number;
+} inputs[RECORD_FILES + 1];
+static size_t input_count;
+
+static void input_note(FILE *file) {
+    struct stat facts;
+    if (input_count < COUNT(inputs) && fstat(fileno(file), &facts) == 0 && S_ISREG(facts.st_mode)) {
+        inputs[input_count].device = facts.st_dev;
+        inputs[input_count++].number = facts.st_ino;
+    }
+}
+
+static bool input_is(const char *path) {
+    struct stat facts;
+    size_t i = 0;
+    if (stat(path, &facts) != 0)
+        return false;
+    while (i < input_count &&
+           (inputs[i].device != facts.st_dev || inputs[i].number != facts.st_ino))
+        i++;
+    return i < input_count;
+}
+
 Status input_read(const char *path, Bytes *text, Problem *problem) {
     *text = (Bytes){.most = INPUT_BYTES};
     const bool is_input = strcmp(path, "-") == 0;
@@ -27,6 +53,7 @@ Status input_read(const char *path, Bytes *text, Problem *problem) {
                            : errno == EACCES ? STATUS_FORBIDDEN
                                              : STATUS_IO,
                            "cannot be read: %s", strerror(errno));
+    input_note(file);
     char piece[65536];
     size_t count = 0;
     while (!text->is_failed && (count = fread(piece, 1, sizeof piece, file)) > 0)
@@ -156,6 +183,10 @@ Status output_open(const char *path, Problem *problem) {
     if (strlen(path) >= PATH_SIZE || !output_resolve(path))
         return problem_set(problem, STATUS_IO,
                            "%.200s cannot be written: the name, or that of its target, is too long",
+                           path);
+    if (input_is(path))
+        return problem_set(problem, STATUS_USAGE,
+                           "%s cannot be written: it was read as an input; choose another name",
                            path);
     snprintf(part_path, sizeof part_path, "%.*s.XXXXXX", PATH_SIZE - 8, final_path);
     const bool is_special = output_is_special(path);

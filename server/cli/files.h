@@ -45,7 +45,8 @@ const char *path_extension(const char *path);
 bool output_is_standard(const char *path);
 // Opens a new file beside `path` or beside the file that a symbolic link leads to; a device or a
 // pipe itself; standard output for NULL and "-". A terminal gets no control characters there,
-// except for "-". One output at a time. STATUS_IO, with the reason.
+// except for "-". One output at a time. STATUS_IO, with the reason; STATUS_USAGE for a file that
+// was read.
 Status output_open(const char *path, Problem *problem);
 Status output_write(const void *bytes, size_t size, Problem *problem);
 // Makes the file durable and gives it its name; removes it if that fails.

@@ -7,6 +7,7 @@ import pty
 import re
 import resource
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -257,6 +258,25 @@ def test_run_writes_each_format_alike():
         assert numpy.array_equal(table[:, 0], numpy.arange(count) / 1000)
         for column, name in enumerate(channels, 1):
             assert numpy.array_equal(table[:, column], numpy.array(channels[name]["values"])), name
+
+
+def test_an_output_does_not_replace_an_input():
+    """A scene, also by a link or from standard input, and the file of a ground motion stay as they are: exit code 2."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene, link, motion = (os.path.join(folder, name) for name in ("scene.json", "link.json", "motion.csv"))
+        shutil.copy(SPONGE, scene)
+        os.symlink("scene.json", link)
+        with open(motion, "w", encoding="ascii") as file:
+            file.write("0 0\n0.01 1\n0.02 0\n")
+        for arguments in (("run", scene, "-o", scene), ("run", scene, "-o", link), ("run", scene, "--record", motion, "--unit", "g", "-o", motion),
+                          ("sweep", scene, "--vary", "dampers.0.clearance=5mm:10mm:2", "-o", scene),
+                          ("import", motion, "--unit", "g", "-o", motion)):
+            code, _, errors = program.run(*arguments)
+            assert code == 2 and "it was read as an input" in errors, (arguments, code, errors)
+        with open(scene, encoding="utf-8") as file:
+            done = subprocess.run([program.impactd(), "run", "-", "-o", scene], stdin=file, capture_output=True, text=True, check=False)
+        assert done.returncode == 2 and os.path.getsize(scene) == os.path.getsize(SPONGE), done
+        assert os.path.getsize(motion) == 18 and sorted(os.listdir(folder)) == ["link.json", "motion.csv", "scene.json"]
 
 
 def test_an_output_can_be_replaced_and_is_readable():
