@@ -151,6 +151,8 @@ static Status token_act(TokenSettings *settings, const Options *options, Problem
                            name);
     text_fit(row.name, sizeof row.name, name != NULL ? name : "");
     TRY(command_data_folder(&settings->data, problem));
+    if (action->act != token_create) // a wrong folder would get a database, and none of its tokens
+        TRY(db_exists(settings->data, problem));
     TRY(db_open_beside(settings->data, &db, problem));
     const Status status = action->act(db, settings, &row, problem);
     db_close(db);

@@ -117,6 +117,12 @@ Status check_exists(const char *path, const char *directory, Problem *problem) {
                              directory);
 }
 
+Status db_exists(const char *directory, Problem *problem) {
+    char path[PATH_MAX];
+    snprintf(path, sizeof path, "%.4000s/impactd.db", directory);
+    return check_exists(path, directory, problem);
+}
+
 Status db_check(const char *directory, const DbCheck *check, Problem *problem) {
     char path[PATH_MAX];
     Sqlite *database = NULL;

@@ -24,6 +24,8 @@ Status db_open(const char *directory, Db **db, Problem *problem);
 // The same folder while a daemon has it, or none: for commands that read or write a few rows. Locks
 // the folder only where the database has to be made or migrated.
 Status db_open_beside(const char *directory, Db **db, Problem *problem);
+// Whether the folder has a database. STATUS_NOT_FOUND.
+Status db_exists(const char *directory, Problem *problem);
 void db_close(Db *db);
 // Makes new names in a folder durable.
 Status data_dir_sync(const char *directory, Problem *problem);

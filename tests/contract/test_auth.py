@@ -220,6 +220,11 @@ def test_token_commands_tell_what_is_wrong():
                 (("lsit",), 2, "create, list, revoke or forget")):
             done = impactd("token", *arguments, "--data", data)
             assert done.returncode == code and text in done.stderr and done.stdout == "", (arguments, done)
+        # In a wrong folder nothing is made but by create.
+        wrong = os.path.join(data, "wrong")
+        for arguments in (("list",), ("revoke", "lab"), ("forget", "lab")):
+            done = impactd("token", *arguments, "--data", wrong)
+            assert done.returncode == 4 and "there is no database in" in done.stderr and not os.path.exists(wrong), (arguments, done)
 
 
 def test_a_token_that_cannot_be_shown_is_not_made():
