@@ -194,11 +194,15 @@ static Status hosts_set(const ServeSettings *settings, const Address *address, c
                : problem_set(problem, STATUS_NO_MEMORY, "no memory for names of hosts");
 }
 
-static Status pem_read(const char *option, const char *path, bool is_secret, Bytes *text,
-                       Problem *problem) {
+// `is_again`: at a signal, where a pipe would keep the server waiting for its writer.
+static Status pem_read(const char *option, const char *path, bool is_secret, bool is_again,
+                       Bytes *text, Problem *problem) {
     enum { PEM_MAX = 1 << 20 };
     struct stat facts;
     errno = 0;
+    if (is_again && stat(path, &facts) == 0 && S_ISFIFO(facts.st_mode))
+        return problem_add(problem, STATUS_USAGE, option,
+                           "is a pipe, which cannot be read again: %s", path);
     if (input_read(path, text, NULL) != STATUS_OK && errno != 0)
         return problem_add(problem, STATUS_USAGE, option, "cannot be read: %s: %s", path,
                            strerror(errno));
@@ -213,7 +217,7 @@ static Status pem_read(const char *option, const char *path, bool is_secret, Byt
 }
 
 // Uses the certificate of the settings, if there is one. STATUS_USAGE: the one in use stays.
-static Status certificate_read(const ServeSettings *settings, Problem *problem) {
+static Status certificate_read(const ServeSettings *settings, bool is_again, Problem *problem) {
     const char *cert = settings->tls_cert, *key = settings->tls_key;
     Bytes cert_text = {0}, key_text = {0};
     if (cert == NULL && key == NULL)
@@ -221,8 +225,8 @@ static Status certificate_read(const ServeSettings *settings, Problem *problem) 
     if (cert == NULL || key == NULL)
         return problem_add(problem, STATUS_USAGE, cert != NULL ? "--tls-cert" : "--tls-key",
                            "needs %s FILE too", cert != NULL ? "--tls-key" : "--tls-cert");
-    const Status all[] = {pem_read("--tls-cert", cert, false, &cert_text, problem),
-                          pem_read("--tls-key", key, true, &key_text, problem)};
+    const Status all[] = {pem_read("--tls-cert", cert, false, is_again, &cert_text, problem),
+                          pem_read("--tls-key", key, true, is_again, &key_text, problem)};
     Status status = status_first(all, COUNT(all));
     if (status == STATUS_OK)
         status = tls_use(cert_text.at, cert, key_text.at, key, problem);
@@ -265,7 +269,7 @@ static void serve_reload(const ServeSettings *settings, Problem *problem) {
     problem_clear(problem);
     if (settings->tls_cert == NULL)
         fprintf(stderr, "impactd: SIGHUP: without TLS there is nothing to reload\n");
-    else if (certificate_read(settings, problem) == STATUS_OK)
+    else if (certificate_read(settings, true, problem) == STATUS_OK)
         fprintf(stderr, "impactd: SIGHUP: the certificate in %s is in use\n", settings->tls_cert);
     else
         fprintf(stderr, "impactd: SIGHUP: the certificate is unchanged: %s\n", problem->detail);
@@ -370,7 +374,7 @@ static Status serve_open(Serving *serving, const ServeSettings *settings, Proble
     const Status all[] = {
         url_status, serve_check(settings, problem),
         hosts_set(settings, address, &url, &serving->hosts, &serving->origins, problem),
-        certificate_read(settings, problem)};
+        certificate_read(settings, false, problem)};
     TRY(status_first(all, COUNT(all)));
     access->log_mode = (LogMode)settings->journal;
     app->request_metrics = access->request_metrics = request_metrics_new(routes);

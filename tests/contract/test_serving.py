@@ -297,6 +297,10 @@ def test_a_renewed_certificate_is_used_without_an_end():
             process.send_signal(signal.SIGHUP)
             assert until(lambda: said().count("is unchanged") == 2 and f"cannot be read: {cert}" in said()), said()
             assert seen().split() == wanted(other_cert).split()
+            # A pipe without a writer: the server would wait for one, deaf to SIGTERM.
+            os.mkfifo(cert)
+            process.send_signal(signal.SIGHUP)
+            assert until(lambda: said().count("is unchanged") == 3 and f"is a pipe, which cannot be read again: {cert}" in said()), said()
         finally:
             process.terminate()
             assert process.wait(20) == 0
