@@ -6,10 +6,12 @@
 #include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -35,6 +37,7 @@ struct Sqlite {
     sqlite3 *connection;
     Statement *statements[STATEMENTS];
     size_t statement_count;
+    ino_t beside[2]; // the numbers of the files beside the database, 0 before the first check
 };
 
 static bool is_full(int code) {
@@ -152,15 +155,39 @@ bool sqlite_is_in_transaction(Sqlite *database) {
     return sqlite3_get_autocommit(database->connection) == 0;
 }
 
-Status sqlite_check_place(Sqlite *database, Problem *problem) {
-    int has_moved = 0;
-    (void)sqlite3_file_control(database->connection, "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
-    if (has_moved == 0)
-        return STATUS_OK;
+static Status report_moved(const char *path, Problem *problem) {
     return problem_set(problem, STATUS_IO,
                        "%s was deleted, moved or replaced while in use: nothing can be stored; put "
                        "it back, or stop the server and start it again",
-                       sqlite3_db_filename(database->connection, "main"));
+                       path);
+}
+
+// SQLite makes its log and the index of it when it opens the database, and writes to them, also
+// without a name, as long as a connection is open.
+static Status sqlite_check_beside(Sqlite *database, const char *path, Problem *problem) {
+    static const char *const endings[] = {"-wal", "-shm"};
+    char beside[PATH_MAX];
+    struct stat facts;
+    for (size_t i = 0; i < COUNT(endings); i++) {
+        snprintf(beside, sizeof beside, "%.4000s%s", path, endings[i]);
+        const bool is_there = stat(beside, &facts) == 0;
+        ino_t *number = &database->beside[i];
+        if (*number != 0 && (is_there ? facts.st_ino != *number : errno == ENOENT))
+            return report_moved(beside, problem);
+        if (is_there)
+            *number = facts.st_ino;
+    }
+    return STATUS_OK;
+}
+
+Status sqlite_check_place(Sqlite *database, Problem *problem) {
+    const char *path = sqlite3_db_filename(database->connection, "main");
+    int has_moved = 0;
+    (void)sqlite3_file_control(database->connection, "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
+    if (has_moved != 0)
+        return report_moved(path, problem);
+    return path != NULL && path[0] != '\0' ? sqlite_check_beside(database, path, problem)
+                                           : STATUS_OK;
 }
 
 uint64_t sqlite_rows_changed(Sqlite *database) {

@@ -117,8 +117,8 @@ Status sqlite_prepare(Sqlite *database, const char *const *texts, Problem *probl
 Status sqlite_touch(Sqlite *database, Problem *problem);
 // Whether a transaction is open. A failed write may have ended it.
 bool sqlite_is_in_transaction(Sqlite *database);
-// STATUS_IO where the file was deleted, renamed or replaced since it was opened: what is written to
-// it then is lost.
+// STATUS_IO where the file, its log or the index of it was deleted, renamed or replaced since it
+// was opened: what is written to them then is lost.
 Status sqlite_check_place(Sqlite *database, Problem *problem);
 // How many rows this connection has changed since it was opened.
 uint64_t sqlite_rows_changed(Sqlite *database);

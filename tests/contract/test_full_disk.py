@@ -125,19 +125,22 @@ def test_a_journal_that_nobody_reads_holds_up_no_worker():
 
 
 def test_a_database_that_was_moved_away_takes_no_jobs():
-    """Nothing is promised that only an unlinked file would hold; put back, it is written to again."""
+    """Nothing is promised that only an unlinked file would hold, of the database, its log or the index of it; put back, it is written to again."""
     with program.daemon() as daemon:
-        known = daemon.submit(scene(0)).json()
-        file = os.path.join(daemon.data, "impactd.db")
-        os.rename(file, file + ".away")
-        refused = daemon.submit(scene(1))
-        assert refused.status == 500 and file in refused.json()["detail"], refused
-        assert daemon.get(known["links"]["self"]).status == 200
-        os.rename(file + ".away", file)
-        assert daemon.submit(scene(2)).json()["status"] == "successful"
+        known = [daemon.submit(scene(0)).json()]
+        for number, name in enumerate(("impactd.db", "impactd.db-wal", "impactd.db-shm")):
+            file = os.path.join(daemon.data, name)
+            os.rename(file, file + ".away")
+            refused = daemon.submit(scene(2 * number + 1))
+            assert refused.status == 500 and f"{file} was deleted, moved or replaced" in refused.json()["detail"], (name, refused)
+            assert daemon.get(known[-1]["links"]["self"]).status == 200
+            os.rename(file + ".away", file)
+            known.append(daemon.submit(scene(2 * number + 2)).json())
+            assert known[-1]["status"] == "successful", known
         daemon.kill()
         daemon.start()
-        assert daemon.get(known["links"]["self"]).status == 200
+        for job in known:
+            assert daemon.get(job["links"]["self"]).status == 200, job
 
 
 def test_a_result_that_the_database_refuses_makes_failed_jobs():
