@@ -461,9 +461,13 @@ static Status part_choose(const ApiCall *call, char what[PART_SIZE], Problem *pr
     if (is_plain && is_table)
         return problem_add(problem, STATUS_USAGE, "--output", "must end in .json for the %s",
                            typed);
+    const char *typed_extension = path_extension(typed);
+    if (typed_extension != NULL && extension != NULL && strcmp(typed_extension, extension) != 0)
+        return problem_add(problem, STATUS_USAGE, "--output", "must end in .%s for %s, is %.200s",
+                           typed_extension, typed, output);
     if (extension == NULL)
         extension = strcmp(typed, "bundle") == 0 ? "zip" : "json";
-    const bool is_complete = is_plain || path_extension(typed) != NULL;
+    const bool is_complete = is_plain || typed_extension != NULL;
     snprintf(what, PART_SIZE, "%s%s%s", typed, is_complete ? "" : ".",
              is_complete ? "" : extension);
     if (is_among(binary_formats, path_extension(what)) && output == NULL && isatty(STDOUT_FILENO))

@@ -327,6 +327,9 @@ def test_wrong_words_are_usage():
             assert code == 2 and out == "" and words in errors and "secret" not in errors, (arguments, code, errors)
         code, _, errors = client("http://127.0.0.1:1", "get", "r-1", environment={"IMPACTD_TOKEN": "secret of mine"})
         assert code == 2 and "IMPACTD_TOKEN" in errors and "secret" not in errors, (code, errors)
+        # A table in another format than its name says.
+        code, _, errors = client("http://127.0.0.1:1", "get", "r-1", "series.csv", "-o", os.path.join(folder, "out.npy"))
+        assert code == 2 and "must end in .csv for series.csv" in errors, (code, errors)
         code, _, errors = client("http://127.0.0.1:1", "get", "r-1", "seires")
         assert code == 2 and "did you mean series?" in errors, (code, errors)
 
