@@ -12,7 +12,8 @@
 
 #include "server/util/clock.h"
 
-// libtasn1 crashes where an allocation of its own fails; 31 certificates and a key take 330 kB.
+// libtasn1 and GMP end the process where an allocation of their own fails; 31 certificates and a
+// key take 330 kB.
 enum { CHAIN_MAX = 32, TLS_BYTES = 1 << 20 };
 
 typedef struct Certificate {
@@ -75,8 +76,8 @@ static void certificate_free(Certificate *certificate) {
     free(certificate);
 }
 
-Status tls_use(const char *cert, const char *cert_path, const char *key, const char *key_path,
-               Problem *problem) {
+static Status tls_load(const char *cert, const char *cert_path, const char *key,
+                       const char *key_path, Problem *problem) {
     const gnutls_datum_t cert_text = {(unsigned char *)cert, (unsigned)strlen(cert)};
     const gnutls_datum_t key_text = {(unsigned char *)key, (unsigned)strlen(key)};
     void *reserve = malloc(TLS_BYTES);
@@ -108,6 +109,14 @@ Status tls_use(const char *cert, const char *cert_path, const char *key, const c
     made->before = atomic_load(&in_use);
     atomic_store(&in_use, made);
     return STATUS_OK;
+}
+
+// GnuTLS may also call a lack of memory a fault of the file, so a file is refused after two
+// attempts: where memory is still short the second one says so.
+Status tls_use(const char *cert, const char *cert_path, const char *key, const char *key_path,
+               Problem *problem) {
+    const Status status = tls_load(cert, cert_path, key, key_path, NULL);
+    return status == STATUS_OK ? status : tls_load(cert, cert_path, key, key_path, problem);
 }
 
 static int tls_retrieve(gnutls_session_t session, const gnutls_datum_t *authorities, int count,
