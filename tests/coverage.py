@@ -100,6 +100,7 @@ def main():
             folders[name] += lines.values()
     for name in sorted(folders):
         show(name, folders[name])
+    sys.exit(0 if any(count > 0 for count, _ in folders["together"]) else "no test has run in this build")
 
 
 if __name__ == "__main__":

@@ -12,10 +12,11 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import bearer, impactd, token, until  # noqa: E402
+from access import bearer, impactd, token  # noqa: E402
 from asking import endless  # noqa: E402
 from client import client  # noqa: E402
 from daemon import Daemon  # noqa: E402
+from program import until  # noqa: E402
 
 SCENE = program.scene("paper_free_sponge")
 

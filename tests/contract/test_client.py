@@ -258,13 +258,7 @@ def test_tls_and_plain_http_taken_for_each_other_are_told():
     with program.daemon() as daemon, tempfile.TemporaryDirectory() as folder:
         code, _, errors = client(daemon.url.replace("http:", "https:"), "submit", SPONGE)
         assert code == 7 and f"plain HTTP, name it as {daemon.url}" in errors, (code, errors)
-        key, certificate = (os.path.join(folder, name) for name in ("key.pem", "cert.pem"))
-        try:
-            subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", certificate, "-days", "2",
-                            "-subj", "/CN=localhost"], check=True, capture_output=True)
-        except (OSError, subprocess.CalledProcessError) as error:
-            raise program.Skipped(f"openssl makes no certificate here: {error}") from None
-        os.chmod(key, 0o600)
+        certificate, key = program.certificate(folder)
         with subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", certificate,
                                "--tls-key", key], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
             try:
@@ -532,13 +526,7 @@ def test_tls_is_verified():
     """A certificate that nobody trusts is refused with the mend; --ca-file trusts it."""
     import ssl
     with tempfile.TemporaryDirectory() as folder:
-        key, certificate = (os.path.join(folder, name) for name in ("key.pem", "cert.pem"))
-        try:
-            subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", certificate,
-                            "-days", "2", "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"],
-                           check=True, capture_output=True)
-        except (OSError, subprocess.CalledProcessError) as error:
-            raise program.Skipped(f"openssl makes no certificate here: {error}") from None
+        certificate, key = program.certificate(folder)
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Fake)
         server.plan, server.seen, server.daemon_threads = [say(body=b'{"id": "r-1"}')], [], True
         server.handle_error = lambda *_: None

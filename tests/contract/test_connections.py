@@ -5,7 +5,6 @@ import contextlib
 import os
 import re
 import resource
-import shutil
 import socket
 import ssl
 import subprocess
@@ -49,13 +48,8 @@ def test_a_chunk_header_that_never_fits_is_closed():
 
 def test_a_chunk_header_that_never_fits_is_closed_under_tls():
     """The same where the library holds bytes that it has deciphered and not read."""
-    if shutil.which("openssl") is None:
-        raise program.Skipped("openssl is not installed")
     with tempfile.TemporaryDirectory() as folder:
-        cert, key = (os.path.join(folder, name) for name in ("cert.pem", "key.pem"))
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost",
-                        "-keyout", key, "-out", cert], check=True, capture_output=True)
-        os.chmod(key, 0o600)
+        cert, key = program.certificate(folder)
         context = ssl.create_default_context(cafile=cert)
         with program.daemon("--tls-cert", cert, "--tls-key", key, data=folder) as daemon:
             for _ in range(5):
@@ -128,8 +122,6 @@ def test_a_soft_limit_of_open_files_is_raised():
 
 def test_an_expired_certificate_is_refused():
     """With the time at which it expired; so is a file without one."""
-    if shutil.which("openssl") is None:
-        raise program.Skipped("openssl is not installed")
     with tempfile.TemporaryDirectory() as folder:
         cert, key, asked = (os.path.join(folder, name) for name in ("cert.pem", "key.pem", "request.pem"))
         for command in (["req", "-new", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", asked, "-subj", "/CN=localhost"],

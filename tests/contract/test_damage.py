@@ -4,6 +4,7 @@
 import contextlib
 import http.client
 import os
+import shutil
 import sqlite3
 import sys
 import tempfile
@@ -23,7 +24,7 @@ def test_damaged_bytes_pages_and_logs_give_right_answers_or_problems():
     """10 copies damaged at seeded places: no other number under an ETag, no end of the daemon, and check-db finds what readers found."""
     faults, counts = damage.run(10, 1)
     assert not faults, faults[0]
-    assert counts["refused"] > 0 and counts["right"] > 0 and counts["check-db finds it"] > 0, counts
+    assert damage.has_tried(counts), counts
 
 
 def entry_of(folder, index, key, other):
@@ -62,7 +63,7 @@ def test_an_index_that_leads_to_another_row_is_damage():
                  ("sqlite_autoindex_materials_1", "felt", "cork", "/v1/materials/felt/measurements")]
         for index, key, other, target in cases:
             folder = os.path.join(base, "copy")
-            damage.shutil.copytree(whole, folder)
+            shutil.copytree(whole, folder)
             entry_of(folder, index, key, other)
             with program.daemon(data=folder) as daemon:
                 reply = daemon.get(target)
@@ -70,7 +71,7 @@ def test_an_index_that_leads_to_another_row_is_damage():
                 assert "etag" not in reply.headers, reply
             code, said, _ = program.run("check-db", "--data", folder)
             assert code == 1 and index in said, (code, said)
-            damage.shutil.rmtree(folder)
+            shutil.rmtree(folder)
 
 
 def test_an_entry_without_a_name_does_not_end_the_daemon():
@@ -131,14 +132,14 @@ def test_rows_of_sweeps_measurements_and_audit_entries_have_checksums():
                  ("UPDATE results SET engine = 'impactd-9'", result)]
         for sql, target in cases:
             folder = os.path.join(base, "copy")
-            damage.shutil.copytree(whole, folder)
+            shutil.copytree(whole, folder)
             changed(folder, sql)
             with program.daemon(data=folder) as daemon:
                 reply = daemon.get(target)
                 assert reply.status == 500 and "damaged" in reply.json()["detail"], (sql, reply)
             code, said, _ = program.run("check-db", "--data", folder)
             assert code == 1 or "DELETE" in sql, (sql, said)
-            damage.shutil.rmtree(folder)
+            shutil.rmtree(folder)
 
 
 def test_a_cut_index_of_the_log_loses_nothing():

@@ -9,8 +9,10 @@ import time
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
 from disk import fill, small_disk  # noqa: E402
+from program import until  # noqa: E402
 
 ASYNC = {"Prefer": "respond-async"}
+
 
 def scene(number, psd=True):
     """A scene whose spectrum alone takes some 100 KB."""
@@ -27,13 +29,6 @@ def long_scene(number, duration):
                 accuracy={"solver": "rk4", "step": 1e-5})
     made["dampers"][0]["clearance"] = 0.012 + 1e-6 * number
     return made
-
-
-def until(condition, seconds=60):
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.1)
-    return condition()
 
 
 def test_a_full_disk_stops_writes_alone():

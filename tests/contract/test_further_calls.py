@@ -7,8 +7,9 @@ import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import bearer, token, until  # noqa: E402
+from access import bearer, token  # noqa: E402
 from asking import endless, problem, sponge  # noqa: E402
+from program import until  # noqa: E402
 
 LAB = "https://lab.example.org"
 HTML = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"

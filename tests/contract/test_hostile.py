@@ -12,8 +12,9 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import bearer, impactd, token, until  # noqa: E402
+from access import bearer, impactd, token  # noqa: E402
 from asking import endless  # noqa: E402
+from program import until  # noqa: E402
 
 SANITIZED = True
 WAITS = True

@@ -6,7 +6,6 @@ import http.client
 import json
 import os
 import shutil
-import sqlite3
 import sys
 import tempfile
 import threading
@@ -14,6 +13,7 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from database import rows  # noqa: E402
 
 NIGHTLY = True
 
@@ -34,19 +34,6 @@ def fitting_duration():
     took = min(json.loads(program.run("run", "-", text=json.dumps(long_scene(0, 500)))[1])["timing"]["run"]
                for _ in range(3))
     return round(500 * RUN / took)
-
-
-def rows(folder, query):
-    """Reads a copy of the database as the killed daemon left it."""
-    with tempfile.TemporaryDirectory() as copy:
-        for name in os.listdir(folder):
-            if name.startswith("impactd.db"):
-                shutil.copy(os.path.join(folder, name), copy)
-        connection = sqlite3.connect(os.path.join(copy, "impactd.db"))
-        try:
-            return connection.execute(query).fetchall()
-        finally:
-            connection.close()
 
 
 def submit(daemon, scene):

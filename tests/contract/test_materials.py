@@ -7,8 +7,9 @@ import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import bearer, token, until  # noqa: E402
+from access import bearer, token  # noqa: E402
 from asking import problem  # noqa: E402
+from program import until  # noqa: E402
 
 FELT = {"name": "Felt", "kind": "Textile", "thickness": 0.004, "restitution": 0.3, "restitution_deviation": 0.02, "contact_time": 0.02,
         "least_speed": 0.2, "most_speed": 0.8, "impactor": "steel ball, 30 mm", "impactor_mass": 0.11, "base": "fixed",

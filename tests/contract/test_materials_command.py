@@ -11,8 +11,9 @@ import threading
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import token, until  # noqa: E402
+from access import token  # noqa: E402
 from client import client, fake, say  # noqa: E402
+from program import until  # noqa: E402
 
 SANITIZED = "nightly"
 FOAM = {"slug": "foam", "name": "Foam, 12 mm", "kind": "foam", "restitution": 0.55, "contact_time": 0.02,

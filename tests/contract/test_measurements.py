@@ -357,7 +357,7 @@ def test_only_those_who_may_write_materials_measure():
     with program.daemon() as daemon:
         reader = access.bearer(access.token(daemon.data, "reader", "read,submit"))
         writer = access.bearer(access.token(daemon.data, "writer", "read,materials"))
-        assert access.until(lambda: daemon.get(SPONGE).status == 401)
+        assert program.until(lambda: daemon.get(SPONGE).status == 401)
         asking.problem(post(daemon, drops([0.6])), 401)
         for query in ("", "?dry_run=1"):
             asking.problem(daemon.request("POST", f"{SPONGE}/measurements{query}", json=drops([0.6]), headers=reader), 403)

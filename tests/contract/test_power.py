@@ -20,7 +20,7 @@ def test_nothing_acknowledged_is_lost_at_a_power_failure():
         raise program.Skipped("the recorder is loaded before the sanitizers")
     faults, counts = power.run(15, 5, 2, 1)
     assert not faults, faults[0]
-    assert counts["rows"] > 0 and counts["served"] > 0, counts
+    assert counts["rows"] > 0 and counts["served"] > 0 and counts["restoring"] > 0, counts
     print(f"      15 states, {counts['rows']} acknowledgements compared, {counts['served']} over HTTP")
 
 

@@ -25,9 +25,10 @@ import pandas
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import token, until  # noqa: E402
+from access import token  # noqa: E402
 from asking import endless  # noqa: E402
 from client import fake, raw, say  # noqa: E402
+from program import until  # noqa: E402
 
 sys.path.insert(0, os.path.join(program.SOURCE, "web", "client"))
 sys.dont_write_bytecode = True
@@ -503,9 +504,7 @@ def test_files_are_whole_or_absent():
 def test_tls_needs_a_known_authority():
     """https works with ca_file alone; without it the message names it."""
     with tempfile.TemporaryDirectory() as folder:
-        key, certificate = f"{folder}/key.pem", f"{folder}/cert.pem"
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", key, "-out",
-                        certificate, "-days", "2", "-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"], check=True, capture_output=True)
+        certificate, key = program.certificate(folder)
         with subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", certificate,
                                "--tls-key", key], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
             try:

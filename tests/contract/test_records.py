@@ -21,8 +21,9 @@ import scipy.signal
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import bearer, token, until  # noqa: E402
+from access import bearer, token  # noqa: E402
 from asking import problem  # noqa: E402
+from program import until  # noqa: E402
 
 SANITIZED = "nightly"
 WAITS = True

@@ -21,7 +21,7 @@ def ran(count, **options):
     """A campaign without a fault."""
     campaign = schedules.Campaign(**options)
     campaign.run(count)
-    assert not campaign.wrong, campaign.wrong[:3]
+    assert campaign.is_good(), (campaign.outcomes, campaign.wrong[:3])
     return campaign
 
 
@@ -39,7 +39,7 @@ def test_threads_have_no_race_amid_faults_ends_and_reloads():
     if program.sanitizer() != "thread":
         raise program.Skipped("asked where threads are watched")
     ran(60, is_free=True)
-    assert ran(60, has_faults=True).outcomes["faults"] > 20
+    ran(60, has_faults=True)
 
 
 if __name__ == "__main__":

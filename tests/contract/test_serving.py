@@ -22,9 +22,10 @@ import urllib.request
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from access import bearer, impactd, token, until  # noqa: E402
+from access import bearer, impactd, token  # noqa: E402
 from asking import endless  # noqa: E402
 from daemon import Daemon  # noqa: E402
+from program import until  # noqa: E402
 
 SCENE = program.scene("paper_free_sponge")
 
@@ -201,22 +202,11 @@ def test_settings_that_contradict_each_other_do_not_start():
         assert "journal = errors  # default" in shown and "# tls_cert" in shown, shown
 
 
-def certificate(folder, days=2):
-    cert, key = os.path.join(folder, f"cert{days}.pem"), os.path.join(folder, f"key{days}.pem")
-    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", cert, "-days", str(days),
-                    "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"],
-                   check=True, capture_output=True)
-    os.chmod(key, 0o600)
-    return cert, key
-
-
 def test_tls_serves_and_refuses_bad_files():
     """A certificate and its key: HTTPS with HSTS; a key of another, a key open to all: refused with the mend."""
-    if shutil.which("openssl") is None:
-        raise program.Skipped("openssl is not installed")
     with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
-        cert, key = certificate(folder)
-        _, other = certificate(folder, 3)
+        cert, key = program.certificate(folder)
+        _, other = program.certificate(folder, "other")
         done = impactd("serve", "--data", folder, "--tls-cert", cert, "--tls-key", other)
         assert done.returncode == 2 and "not that of the certificate" in done.stderr, done
         chain = os.path.join(folder, "chain.pem")
@@ -253,11 +243,9 @@ def test_tls_serves_and_refuses_bad_files():
 
 def test_a_renewed_certificate_is_used_without_an_end():
     """SIGHUP: new connections see the new certificate, old ones go on; faulty files change nothing and are told."""
-    if shutil.which("openssl") is None:
-        raise program.Skipped("openssl is not installed")
     with tempfile.TemporaryDirectory(prefix="impactd-") as folder:
-        cert, key = certificate(folder)
-        other_cert, other_key = certificate(folder, 3)
+        cert, key = program.certificate(folder)
+        other_cert, other_key = program.certificate(folder, "other")
         journal = os.path.join(folder, "journal")
         with open(journal, "w", encoding="utf-8") as errors:
             process = subprocess.Popen([program.impactd(), "serve", "--listen", "127.0.0.1:0", "--data", folder, "--tls-cert", cert,

@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
 """kill -9 in the middle of a sweep, and a disk that is full for a while: no row lost, none twice, the same bytes."""
 
-import contextlib
 import os
 import random
 import shutil
-import sqlite3
 import sys
 import tempfile
 import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from database import rows  # noqa: E402
+from disk import fill, small_disk  # noqa: E402
+from program import until  # noqa: E402
 
 POINTS, KILLS = 6000, 6
 DURATION = 30  # of a scene [s]: the sweep is some seconds of CPU, in a dozen chunks or more
@@ -26,17 +27,9 @@ def scene(duration):
 
 def stored(folder):
     """(chunks written down, chunks there, chunks twice) as the killed daemon left them."""
-    with tempfile.TemporaryDirectory() as copy:
-        for name in os.listdir(folder):
-            if name.startswith("impactd.db"):
-                shutil.copy(os.path.join(folder, name), copy)
-        connection = sqlite3.connect(os.path.join(copy, "impactd.db"))
-        try:
-            wanted = connection.execute("SELECT chunks FROM sweeps").fetchall()
-            there = connection.execute("SELECT count(*), count(DISTINCT chunk) FROM sweep_chunks").fetchone()
-            return (wanted[0][0] if wanted else None), there[0], there[0] - there[1]
-        finally:
-            connection.close()
+    wanted = rows(folder, "SELECT chunks FROM sweeps")
+    (there, distinct), = rows(folder, "SELECT count(*), count(DISTINCT chunk) FROM sweep_chunks")
+    return (wanted[0][0] if wanted else None), there, there - distinct
 
 
 def tables(daemon, job):
@@ -82,37 +75,6 @@ def test_a_sweep_survives_being_killed_again_and_again():
     assert kept[0] < wanted and len(set(kept)) > 2, "the kills did not fall into the sweep"
 
 
-@contextlib.contextmanager
-def small_disk():
-    """A folder on a disk of its own."""
-    folder = tempfile.mkdtemp(prefix="impactd-")
-    mounted = os.system(f"mount -t tmpfs -o size=16m tmpfs {folder} 2>/dev/null") == 0
-    try:
-        if not mounted:
-            raise program.Skipped("no tmpfs can be mounted here")
-        yield folder
-    finally:
-        if mounted:
-            os.system(f"umount {folder}")
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def fill(folder):
-    """Takes all that is free; the file to remove again."""
-    ballast = os.path.join(folder, "ballast")
-    with contextlib.suppress(OSError), open(ballast, "wb", buffering=0) as file:
-        while True:
-            file.write(b"\0" * 4096)
-    return ballast
-
-
-def until(condition, what, seconds=60):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, what
-        time.sleep(0.05)
-
-
 def test_a_full_disk_pauses_a_sweep_until_there_is_room():
     """Rows that cannot be written wait; when there is room again the sweep goes on, without a restart, to the same end."""
     asked = scene(DURATION / 3)
@@ -125,7 +87,7 @@ def test_a_full_disk_pauses_a_sweep_until_there_is_room():
         while daemon.get(f"/v1/jobs/{job}").json().get("points") is None:
             time.sleep(0.02)
         ballast = fill(folder)
-        until(lambda: "pauses" in daemon.stderr(), "the disk was never full to the sweep")
+        assert until(lambda: "pauses" in daemon.stderr()), "the disk was never full to the sweep"
         assert daemon.get(f"/v1/jobs/{job}").json()["status"] == "running"
         os.remove(ballast)
         assert tables(daemon, daemon.finished(job, 300)) == undisturbed
@@ -155,7 +117,7 @@ def test_a_sweep_that_cannot_be_written_down_begins_when_there_is_room():
             return document["status"] != "accepted" and document["progress"] > 13  # judged
         assert daemon.get(f"/v1/jobs/{job}").json()["status"] == "accepted", "it began before the disk was full"
         daemon.request("DELETE", f"/v1/jobs/{first}")  # which makes way, though that cannot be written down
-        until(is_at_it, document)
+        assert until(is_at_it), document
         time.sleep(1)
         document.update(daemon.get(f"/v1/jobs/{job}").json())
         assert document["status"] == "running" and document.get("points") is None, document

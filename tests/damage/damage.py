@@ -3,9 +3,8 @@
 
     tests/damage/damage.py --build build [--copies 300] [--seed 1]
 
-A database with some of everything is copied, damaged at a seeded place and served: every target is read, before and after
-its ETag is known. An answer of 200 or 304 is the one that was given before the damage. A damaged WAL may hold an earlier
-state, which then has other ETags. `impactd check-db` finds what readers found. contract/test_damage.py is the short version.
+A database with some of everything is copied, damaged at a seeded place and served: every target is read. An answer of 200 is
+the one that was given before the damage. A damaged WAL may hold an earlier state, which then has other ETags. `impactd check-db` finds what readers found. contract/test_damage.py is the short version.
 """
 import argparse
 import collections
@@ -69,19 +68,19 @@ def fill(folder, with_wal):
     return targets
 
 
-def read(daemon, target, headers=None):
-    reply = daemon.request("GET", target, headers=headers or {}, timeout=30)
+def read(daemon, target):
+    reply = daemon.get(target, timeout=30)
     return reply.status, reply.headers.get("etag"), reply.headers.get("content-type"), reply.body
 
 
 def expected(folder, targets):
-    """What is right: read twice, as a series that was computed anew has to be the same."""
+    """What is right, of a copy: a daemon that starts changes the files."""
     with tempfile.TemporaryDirectory() as copy:
         shutil.copytree(folder, copy, dirs_exist_ok=True)
         with program.daemon(*OPTIONS, data=copy) as daemon:
-            first = {target: read(daemon, target) for target in targets}
-            assert all(answer[0] == 200 for answer in first.values()), [one for one in first.items() if one[1][0] != 200]
-            return first
+            right = {target: read(daemon, target) for target in targets}
+            assert all(answer[0] == 200 for answer in right.values()), [one for one in right.items() if one[1][0] != 200]
+            return right
 
 
 # Damage: each changes the files of a folder, and returns what it did.
@@ -205,8 +204,6 @@ def lacks(answer, right, key=None):
 def is_right(target, answer, right, is_wal):
     """Whether it may be served: what belongs to a result only whole, of others rows may be missing."""
     status, etag, kind, body = answer
-    if status == 304:
-        return True
     if status != 200:
         return status in REFUSED and kind == "application/problem+json"
     if answer == right or (is_wal and (etag is None or etag != right[1])):
@@ -253,7 +250,7 @@ def one_copy(folder, targets, right, damage, chance, is_wal, counts):
                 if not daemon.is_alive():
                     return f"{what}: the daemon ended: {daemon.stderr()[-1000:]}"
                 code, _ = daemon.stop(60)
-                if code != 0 or "runtime error:" in daemon.stderr() or "ERROR: " in daemon.stderr():
+                if code != 0 or program.sanitizer_report(daemon.stderr()):
                     return f"{what}: ended with {code}: {daemon.stderr()[-1000:]}"
             except (OSError, ValueError, subprocess.TimeoutExpired) as fault:
                 return f"{what}: {fault!r}; {daemon.is_alive()}: {daemon.stderr()[-1000:]}"
@@ -291,6 +288,11 @@ def run(copies, seed, only=None):
     return faults, counts
 
 
+def has_tried(counts):
+    """The damage was met, and did not take everything with it."""
+    return counts["right"] > 0 and counts["refused"] > 0 and counts["check-db finds it"] > 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--build", required=True)
@@ -302,7 +304,7 @@ def main():
     print(", ".join(f"{count} {name.replace('damage_', '')}" for name, count in counts.items() if name.startswith("damage_")))
     print(f"{arguments.copies} damaged copies: {counts['not started']} not started, with the reason; {counts['right']} answers right, {counts['refused']} "
           f"refused, {counts['older']} of an earlier state or lists with a mark; check-db finds {counts['check-db finds it']}; {len(faults)} wrong")
-    sys.exit(1 if faults else 0)
+    sys.exit(0 if not faults and has_tried(counts) else 1)
 
 
 if __name__ == "__main__":

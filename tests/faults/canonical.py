@@ -4,6 +4,7 @@ import json
 import os
 import sqlite3
 
+import asking
 import program
 
 JSON = {"Content-Type": "application/json"}
@@ -74,8 +75,15 @@ def lab(number):
 
 
 def motion(number):
-    """A random base, and a ground motion of the database."""
     return scene(number, excitation={"kind": "random", "band": [0, 15], "rms": 1, "seed": 1})
+
+
+def shaken(setup, number):
+    """A run on a ground motion of its own, which is not in the cache: it is read and its digest is checked."""
+    made = setup.daemon.request("POST", "/v1/records", json={**record(10**7 + number), "samples": [0, number, -2]})
+    assert made.status == 201, made
+    body = scene(number, excitation={"kind": "record", "name": f"shake_{10**7 + number}"})
+    return "POST", "/v1/jobs", json.dumps(body), {**JSON, **WAIT}
 
 
 def felt(number):
@@ -95,9 +103,7 @@ def frame(number):
 
 def cancelled(setup, number):
     """The cancel of a job that takes long."""
-    body = scene(number, duration=2500, sample_rate=10, output={"channels": [], "psd": None, "reduction": False},
-                 accuracy={"solver": "rk4", "step": 1e-5})
-    reply = setup.daemon.submit(body, headers={"Prefer": "respond-async"})
+    reply = setup.daemon.submit(asking.endless(number), headers={"Prefer": "respond-async"})
     assert reply.status == 202, reply
     return "DELETE", f"/v1/jobs/{reply.json()['id']}", None, {}
 
@@ -166,6 +172,7 @@ REQUESTS = {
     "compare measured": (post("/v1/compare", lambda number: {"a": "{a}", **measured(number)}), {200}),
     "run": (job(scene), {200}),
     "run random": (job(motion), {200}),
+    "run record": (shaken, {200}),
     "run frame": (job(frame), {200}),
     "run adaptive": (job(lambda number: scene(number, accuracy={"solver": "adaptive"})), {200}),
     "sweep": (job(lambda number: study(number, kind="sweep", metrics=["impacts"], axes=[CLEARANCES])), {200}),

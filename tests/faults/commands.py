@@ -8,9 +8,6 @@ A command has some 20,000 allocations, but 2,000 to 3,000 distinct call stacks o
 Starts of the server (with a new database, and with jobs to continue), copies, checks and files of results. After each fault the
 database is whole, in its old state or the new one, and the command without a fault succeeds. The suite runs a few of them
 (tests/contract/test_faults.py)."""
-import argparse
-import collections
-import concurrent.futures
 import contextlib
 import os
 import shutil
@@ -19,18 +16,19 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
-import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import campaign  # noqa: E402
 import program  # noqa: E402
-from control import ALLOCATIONS, KINDS, Control  # noqa: E402
+from control import KINDS, Control  # noqa: E402
 
 TIMEOUT = 60  # [s]
-# What a message says of a fault. A disk that did not answer once is not called damaged.
-WORDS = {"allocations": ("memory",), "stacks": ("memory",), "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing", "did not confirm"),
-         "ENOSPC": ("No space", "no room", "cannot open", "could not be opened", "did not confirm"), "short": ("",)}
-SERVE = ("serve", "--listen", "127.0.0.1:0", "--workers", "1", "--data", "{}/data")
+# What a message says of a fault, and what it does not: no file is called faulty.
+WORDS = {"allocations": ("memory",), "stacks": ("memory",), "short": ("",),
+         "EIO": ("Input/output error", "I/O error", "cannot open", "could not be opened", "Reading or writing", "did not confirm", "cannot be read"),
+         "ENOSPC": ("No space", "no room", "cannot open", "could not be opened", "did not confirm", "cannot be read")}
+BLAMES = ("is damaged, or", "must be a certificate", "cannot be used")
 # A study in a folder, as a cluster's tasks find it.
 SCENE = {"structure": {"kind": "sdof", "mass": 1.35, "stiffness": 865},
          "dampers": [{"mass": 0.1, "clearance": 0.01, "buffer": {"restitution": 0.6, "contact_time": 0.02}}],
@@ -45,7 +43,7 @@ MOTION = "PEER\nrecord\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 4, DT= .02
 
 
 def prepare(folder):
-    """What the commands find: a database with results and unfinished jobs, a copy of an earlier state, a ground motion, a scene."""
+    """What the commands find: a database with results and unfinished jobs, a copy of an earlier state, a ground motion, a scene, a certificate."""
     data = os.path.join(folder, "data")
     scene = program.scene("paper_free_sponge")
     scene["duration"] = 2
@@ -62,6 +60,7 @@ def prepare(folder):
             assert daemon.submit(long, headers={"Prefer": "respond-async"}).status == 202
     finally:
         daemon.kill()
+    program.certificate(folder)
     os.makedirs(os.path.join(folder, "study", "chunks"))
     for name, text in (("motion.AT2", MOTION), ("scene.json", program.json.dumps(scene)),
                        ("study/study", program.json.dumps({"engine": engine, **STUDY}))):
@@ -128,8 +127,8 @@ class Case:
 class Start(Case):
     """The server: started, and stopped when it listens."""
 
-    def __init__(self, is_new):
-        super().__init__(*SERVE, target="data/impactd.db", without=("data/impactd.db",) if is_new else ())
+    def __init__(self, *arguments, **more):
+        super().__init__("serve", "--listen", "127.0.0.1:0", "--workers", "1", "--data", "{}/data", *arguments, target="data/impactd.db", **more)
 
     def is_allowed(self, state, before, after, has_succeeded):
         """Nothing is lost; jobs go on."""
@@ -151,8 +150,9 @@ class Start(Case):
 
 
 CASES = {
-    "new": Start(is_new=True),
-    "start": Start(is_new=False),
+    "new": Start(without=("data/impactd.db", "data/impactd.db-wal")),
+    "start": Start(),
+    "start with TLS": Start("--tls-cert", "{}/cert.pem", "--tls-key", "{}/cert_key.pem", codes=(1, 2)),  # 2: a file that an option names cannot be read
     "backup": Case("backup", "{}/new.db", "--data", "{}/data", target="new.db"),
     "backup over": Case("backup", "{}/copy.db", "--data", "{}/data", "--force", target="copy.db"),
     "restore": Case("restore", "{}/copy.db", "--data", "{}/data", "--force", target="data/impactd.db"),
@@ -164,18 +164,10 @@ CASES = {
 }
 
 
-class Campaign:
-    """Every `stride`-th call or call stack of one command, from the `first` on."""
+class Campaign(campaign.Campaign):
+    """Calls or call stacks of one command; what it said is kept."""
 
-    def __init__(self, kind, stride=1, first=1):
-        self.kind, self.stride, self.first = kind, stride, first
-        self.calls, self.error = KINDS.get(kind, (ALLOCATIONS, 0))
-        self.tried, self.count, self.outcomes, self.wrong = 0, 0, collections.Counter(), []
-
-    def fault(self, what, text):
-        self.outcomes[what] += 1
-        self.wrong.append(text)
-        print(f"  {what}: {text[:600]}", flush=True)
+    said = ""
 
     def run(self, name):
         root = tempfile.mkdtemp(prefix="impactd-")
@@ -190,37 +182,34 @@ class Campaign:
             self.faulty = {**os.environ, **control.environment}
             control.arm(0, self.calls, self.error, lists_stacks=self.kind == "stacks")
             code, said = self.case.run(self.folder, self.faulty)
-            self.count, _ = control.disarm()
+            count_of_calls, _ = control.disarm()
             assert code == 0, (name, code, said)
             after = self.case.state(self.folder)
             # Each is a number of a call and a call stack; 0: any.
-            calls = [(1, stack) for stack in control.stacks()] or [(n, 0) for n in range(1, self.count + 1)]
-            self.count = len(calls)
+            calls = [(1, stack) for stack in control.stacks()] or [(n, 0) for n in range(1, count_of_calls + 1)]
             for permanent in (False, True):
-                for n, stack in calls[self.first - 1::self.stride]:
+                for n, stack in calls[self.chosen]:
                     self.case.reset(self.template, self.folder)
                     control.arm(n, self.calls, self.error, permanent, stack)
-                    where = f"stack {stack:x}" if stack else f"call {n} of {self.count}"
+                    where = f"stack {stack:x}" if stack else f"call {n} of {len(calls)}"
                     self.judge(f"{name}, {'from ' if permanent else ''}{where}", control, before, after)
         finally:
             shutil.rmtree(root, ignore_errors=True)
 
     def judge(self, where, control, before, after):
-        self.tried += 1
         try:
             code, said = self.case.run(self.folder, self.faulty)
         except subprocess.TimeoutExpired:
             self.fault("hung", where)
             return
         finally:
-            _, failed = control.disarm()
-        if not failed:
-            self.outcomes["not reached"] += 1
-        if code < 0 or "ERROR: " in said or "runtime error" in said:
+            self.disarm(control)
+        self.said += said
+        if code < 0 or program.sanitizer_report(said):
             self.fault("crashed", f"{where}: {code}: {said[-3000:]}")
         elif code == 0:
             self.outcomes["done"] += 1
-        elif code not in self.case.codes or not any(word in said for word in WORDS[self.kind]) or "is damaged, or" in said:
+        elif code not in self.case.codes or not any(word in said for word in WORDS[self.kind]) or any(words in said for words in BLAMES):
             self.fault("unclear", f"{where}: {code}: {said}")
         else:
             self.outcomes["refused"] += 1
@@ -236,36 +225,5 @@ class Campaign:
             self.fault("then failed", f"{where}: {code}: {said}")
 
 
-def part(kind, stride, first, name):
-    """What a process does: the numbers of a command that are dealt to it."""
-    campaign = Campaign(kind, stride, first)
-    campaign.run(name)
-    return campaign
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--build", default=program.build)
-    parser.add_argument("--stride", type=int, default=1, help="each so many N")
-    parser.add_argument("--processes", type=int, default=4, help="commands at the same time")
-    parser.add_argument("kind", choices=["stacks", "allocations", *KINDS])
-    parser.add_argument("names", nargs="*", default=list(CASES))
-    arguments = parser.parse_args()
-    program.build = os.path.abspath(arguments.build)
-    outcomes, began, has_faults = collections.Counter(), time.monotonic(), False
-    with concurrent.futures.ProcessPoolExecutor(arguments.processes) as pool:
-        stride = arguments.stride * arguments.processes
-        parts = {name: [pool.submit(part, arguments.kind, stride, first, name) for first in range(1, stride + 1, arguments.stride)]
-                 for name in arguments.names}
-        for name, all_of_it in parts.items():
-            done = [one.result() for one in all_of_it]
-            for one in done:
-                outcomes += one.outcomes
-                has_faults = has_faults or bool(one.wrong)
-            print(f"{name}: {done[0].count} calls, {sum(one.tried for one in done)} tried, after {time.monotonic() - began:.0f} s", flush=True)
-    print(f"{arguments.kind}: " + ", ".join(f"{number} {what}" for what, number in sorted(outcomes.items())))
-    return 1 if has_faults else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(campaign.main(Campaign, __doc__, ["stacks", "allocations", *KINDS], lambda kind: list(CASES), processes=4))

@@ -131,7 +131,38 @@ static void stacks_add(uint64_t stack) {
     }
 }
 
-static bool call_fails(unsigned call) {
+static bool address_is_fragile(uintptr_t address) {
+    for (size_t i = 0; i < range_count; i++)
+        if (address >= ranges[i].from && address < ranges[i].to)
+            return true;
+    return false;
+}
+
+typedef struct {
+    uintptr_t allocator; // an address in what called malloc
+    bool is_passed, is_fragile;
+} Caller;
+
+static _Unwind_Reason_Code caller_find(struct _Unwind_Context *frame, void *context) {
+    Caller *caller = context;
+    const uintptr_t address = _Unwind_GetIP(frame);
+    if (caller->is_passed) {
+        caller->is_fragile = address_is_fragile(address);
+        return _URC_END_OF_STACK;
+    }
+    caller->is_passed = address == caller->allocator;
+    return _URC_NO_REASON;
+}
+
+// GnuTLS allocates for GMP, which has no answer to a failure: GnuTLS aborts.
+static bool is_for_fragile(uintptr_t allocator) {
+    Caller caller = {.allocator = allocator};
+    (void)_Unwind_Backtrace(caller_find, &caller);
+    return caller.is_fragile;
+}
+
+// `allocator` is what called malloc, 0 for a call of files.
+static bool call_fails(unsigned call, uintptr_t allocator) {
     if (control == NULL || (atomic_load(&control->calls) & 1u << call) == 0)
         return false;
     uint64_t awaited = atomic_load(&control->count) == 0 ? atomic_load(&control->stack) : 0;
@@ -145,6 +176,8 @@ static bool call_fails(unsigned call) {
     }
     uint64_t number = atomic_fetch_add(&control->count, 1) + 1, n = atomic_load(&control->n);
     bool fails = n > 0 && (number == n || (number > n && atomic_load(&control->is_permanent)));
+    if (fails && allocator != 0)
+        fails = !is_for_fragile(allocator);
     if (fails)
         atomic_fetch_add(&control->failed, 1);
     return fails;
@@ -154,12 +187,9 @@ static bool call_fails(unsigned call) {
 static __thread bool is_of_sanitizer __attribute__((tls_model("initial-exec")));
 
 static bool allocation_fails(const void *caller) {
-    if (is_of_sanitizer)
+    if (is_of_sanitizer || address_is_fragile((uintptr_t)caller))
         return false;
-    for (size_t i = 0; i < range_count; i++)
-        if ((uintptr_t)caller >= ranges[i].from && (uintptr_t)caller < ranges[i].to)
-            return false;
-    if (!call_fails(CALL_ALLOCATE))
+    if (!call_fails(CALL_ALLOCATE, (uintptr_t)caller))
         return false;
     errno = ENOMEM;
     return true;
@@ -223,7 +253,7 @@ int pthread_getattr_np(pthread_t thread, pthread_attr_t *attributes) {
 }
 
 static bool file_fails(unsigned call) {
-    if (!call_fails(call))
+    if (!call_fails(call, 0))
         return false;
     errno = atomic_load(&control->error);
     return true;

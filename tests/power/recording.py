@@ -14,7 +14,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
-from daemon import Daemon  # noqa: E402
 
 ASYNC = {"Prefer": "respond-async"}
 OPTIONS = ("--workers", "2", "--store-bytes", str(1 << 20))
@@ -99,7 +98,7 @@ class Recording:
         return done.stdout.strip()
 
     def start(self):
-        self.daemon = Daemon(program.build, *OPTIONS, data=self.folder, environment=self.environment)
+        self.daemon = program.Daemon(program.build, *OPTIONS, data=self.folder, environment=self.environment)
         self.daemon.start()
 
     def stop(self, with_signal):
@@ -231,7 +230,6 @@ class Recording:
             self.submit({**self.scene(first + number), "duration": 900, "output": {"channels": [], "psd": None, "impacts": False}}, ASYNC)
         self.stop(with_signal)
 
-
     def jobs(self):
         # After a daemon's end all is in the one file; opened otherwise, SQLite would make the others, unrecorded.
         connection = sqlite3.connect(f"file:{os.path.join(self.folder, 'impactd.db')}?mode=ro&immutable=1", uri=True)
@@ -269,5 +267,3 @@ def record(folder, log, scenes, seed):
         if recording.daemon is not None:
             recording.daemon.kill()
     return recording
-
-

@@ -4,7 +4,8 @@
     tests/storm/cancel_cpu.py [N] [--build build] [--kind WORD]
 
 Each kind is submitted N times (20) and cancelled at times from 0 to 0.4 s after its start. Printed are the median and
-the most CPU in ms, and when that job was cancelled; the end is 1 where one took more than 100 ms."""
+the most CPU in ms, and when that job was cancelled; the end is 1 where one took more than 100 ms, or
+where fewer than half were cancelled before their end."""
 
 import argparse
 import os
@@ -99,7 +100,7 @@ def main():
     parser.add_argument("--kind", default="")
     arguments = parser.parse_args()
     program.build = os.path.abspath(arguments.build)
-    worst = 0
+    worst = asked = cancelled = 0
     with program.daemon("--workers", "1") as daemon:
         for kind, scene in kinds().items():
             if arguments.kind not in kind:
@@ -109,10 +110,11 @@ def main():
                      if (ms := one(daemon, scene, at, number)) is not None]
             most = max(spent, default=(0, 0))
             worst = max(worst, most[0])
+            asked, cancelled = asked + arguments.count, cancelled + len(spent)
             middle = statistics.median(ms for ms, _ in spent) if spent else 0
             print(f"{kind:32} {len(spent):3} cancelled, median {middle:6.1f} ms, most {most[0]:6.1f} ms "
                   f"at {1e3 * most[1]:.0f} ms", flush=True)
-    return 0 if worst <= MOST else 1
+    return 0 if worst <= MOST and 2 * cancelled > asked else 1
 
 
 if __name__ == "__main__":

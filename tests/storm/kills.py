@@ -9,12 +9,10 @@ whole. Every fourth kill is during a start, before the daemon listens or soon af
 import argparse
 import collections
 import concurrent.futures
-import contextlib
 import http.client
 import itertools
 import os
 import random
-import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -23,6 +21,7 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 import program  # noqa: E402
+from database import job_counts  # noqa: E402
 
 ENDED = ("successful", "failed", "dismissed")
 MAX_LIFE = 0.5  # [s] of a daemon amid requests
@@ -120,10 +119,7 @@ def main():
                 print(f"{cycle} kills, {len(everything)} acknowledged, after {time.monotonic() - began:.0f} s", flush=True)
         with program.daemon("--workers", "2", data=folder) as daemon:
             check(daemon, everything, counts, is_end=True)
-        with contextlib.closing(sqlite3.connect(os.path.join(folder, "impactd.db"))) as connection:
-            jobs = collections.Counter(row[0] for row in connection.execute("SELECT id FROM jobs"))
-            counts["duplicated"] = sum(count > 1 for count in jobs.values())
-            assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        counts["duplicated"] = sum(count > 1 for count in job_counts(folder).values())
     kinds = collections.Counter(path.split("/")[2] for path, _ in everything)
     print(f"{arguments.cycles} kills in {time.monotonic() - began:.0f} s, {counts['starts']} before it listened: {kinds['jobs']} jobs, {kinds['records']} records and "
           f"{kinds['materials']} materials acknowledged, {counts['checked']} checked, {counts['lost']} lost, {counts['duplicated']} duplicated")

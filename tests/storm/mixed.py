@@ -14,7 +14,6 @@ import os
 import queue
 import random
 import re
-import sqlite3
 import sys
 import tempfile
 import time
@@ -23,6 +22,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import asker  # noqa: E402
 import program  # noqa: E402
+from database import job_counts  # noqa: E402
 
 CACHE = 16 << 20  # [B] of the daemon, so that it is full soon
 GROWTH = 8 << 20  # [B] that chance may make of it within a life
@@ -95,7 +95,8 @@ class Storm:
             assert code == 0, f"the daemon ended with {code}: {self.daemon.stderr()[-1500:]}"
         else:
             self.daemon.kill()
-        assert "ERROR: " not in self.daemon.stderr(), self.daemon.stderr()[-1500:]
+        spoken = program.sanitizer_report(self.daemon.stderr())
+        assert not spoken, spoken
         self.daemon.start(120)
         self.place.begins(self.daemon.port)
         self.memory.append([])
@@ -172,11 +173,14 @@ class Storm:
         more, opened = self.growth_over_lives()
         return self.typical_growth() < GROWTH and more < DIFFERENCE and max(opened, *(files for _, files in within)) <= OPENED
 
+    def unmet(self):
+        """What no client asked, and each of them if none was checked after a restart."""
+        asked = {what for what, _ in self.codes} if self.checked or self.lives == 1 else set()
+        return {ask.__name__ for _, ask, _ in asker.MIX} - asked
+
     def lost(self):
         """How many acknowledged jobs the database does not have, or twice; to be called when the daemon has ended."""
-        connection = sqlite3.connect(os.path.join(self.daemon.data, "impactd.db"))
-        jobs = collections.Counter(row[0] for row in connection.execute("SELECT id FROM jobs"))
-        connection.close()
+        jobs = job_counts(self.daemon.data)
         return sum(jobs[job] != 1 for job in self.acknowledged), sum(count > 1 for count in jobs.values())
 
 
@@ -201,7 +205,7 @@ def main():
     print(f"{sum(storm.codes.values())} requests in {took:.0f} s, {storm.victims} clients killed, {arguments.restarts} restarts; "
           f"{len(storm.acknowledged)} jobs acknowledged, {storm.checked} checked after restarts: {lost} lost, {doubled} duplicated; "
           f"{storm.typical_growth() / 2**20:.1f} MiB more within a life (median), {storm.growth_over_lives()[0] / 2**20:.1f} MiB from life to life")
-    return 0 if storm.is_flat() and not lost and not doubled else 1
+    return 0 if storm.is_flat() and not lost and not doubled and not storm.unmet() else 1
 
 
 if __name__ == "__main__":

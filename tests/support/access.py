@@ -2,7 +2,6 @@
 import os
 import re
 import subprocess
-import time
 
 import program
 
@@ -22,13 +21,3 @@ def token(data, name, scopes="read,submit", *more):
 
 def bearer(text):
     return {"Authorization": f"Bearer {text}"}
-
-
-def until(condition, seconds=30):
-    """True as soon as `condition` is; a loaded machine takes longer than the second that is promised."""
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.02)
-    return True

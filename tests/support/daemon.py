@@ -7,6 +7,7 @@ With IMPACTD_RECORD=FILE in the environment every request and its answer is one 
 Standard library only. Not a client for users. Used by the tests under contract/ and truth/.
 """
 import base64
+import contextlib
 import http.client
 import json as json_module
 import os
@@ -46,6 +47,29 @@ def record(method, path, headers, body, reply):
     # One append each: tests run beside others.
     with open(target, "ab", buffering=0) as file:
         file.write(json_module.dumps(line).encode() + b"\n")
+
+
+class Connection:
+    """A connection that is kept open, as long as the daemon keeps it."""
+
+    def __init__(self, port, timeout=60):
+        self.connection = http.client.HTTPConnection("127.0.0.1", port, timeout=timeout)
+
+    def request(self, method, path, body=None, json=None, headers=None):
+        headers = dict(headers or {})
+        if json is not None:
+            body = json_module.dumps(json)
+            headers.setdefault("Content-Type", "application/json")
+        if isinstance(body, str):
+            body = body.encode()
+        self.connection.request(method, path, body=body, headers=headers)
+        reply = self.connection.getresponse()
+        answer = Reply(reply.status, {k.lower(): v for k, v in reply.getheaders()}, reply.read())
+        record(method, path, headers, body, answer)
+        return answer
+
+    def close(self):
+        self.connection.close()
 
 
 class Daemon:
@@ -124,21 +148,8 @@ class Daemon:
 
     def request(self, method, path, body=None, json=None, headers=None, timeout=60):
         """One request on a connection of its own."""
-        headers = dict(headers or {})
-        if json is not None:
-            body = json_module.dumps(json)
-            headers.setdefault("Content-Type", "application/json")
-        if isinstance(body, str):
-            body = body.encode()
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout)
-        try:
-            connection.request(method, path, body=body, headers=headers)
-            reply = connection.getresponse()
-            answer = Reply(reply.status, {k.lower(): v for k, v in reply.getheaders()}, reply.read())
-            record(method, path, headers, body, answer)
-            return answer
-        finally:
-            connection.close()
+        with contextlib.closing(Connection(self.port, timeout)) as connection:
+            return connection.request(method, path, body, json, headers)
 
     def get(self, path, **options):
         return self.request("GET", path, **options)

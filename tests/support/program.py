@@ -46,6 +46,20 @@ def is_sanitized():
     return sanitizer() != ""
 
 
+def sanitizer_report(errors):
+    """From the first line that a sanitizer wrote to standard error on; "" without one."""
+    found = re.search(r"^.*(?:ERROR: |runtime error:|WARNING: ThreadSanitizer)", errors, re.M)
+    return errors[found.start():] if found else ""
+
+
+def certificate(folder, name="cert"):
+    """The paths of a certificate of localhost and of its key, which are made."""
+    cert, key = (os.path.join(folder, f"{name}{end}.pem") for end in ("", "_key"))
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost", "-addext",
+                    "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout", key, "-out", cert], check=True, capture_output=True)
+    return cert, key
+
+
 def cpu_of(process):
     """What a process has used so far [s of a processor]."""
     with open(f"/proc/{process}/stat", encoding="utf-8") as file:
@@ -127,8 +141,16 @@ def daemon(*arguments, **options):
         assert code == 0, f"the daemon ended with {code}: {running.stderr()}"
         # 5 s are promised; a machine with much else to do may take some more.
         assert seconds < 15 or is_sanitized(), f"SIGTERM took {seconds:.1f} s"
-        spoken = re.findall(r".*(?:ERROR: |runtime error:|WARNING: ThreadSanitizer).*", running.stderr())
+        spoken = sanitizer_report(running.stderr())
         assert not spoken, spoken
+
+
+def until(condition, seconds=60):
+    """What the condition says as soon as it is true, or after so long."""
+    end = time.monotonic() + seconds
+    while not (said := condition()) and time.monotonic() < end:
+        time.sleep(0.02)
+    return said
 
 
 def finished(running, scene):

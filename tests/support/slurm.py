@@ -16,7 +16,6 @@ import stat
 import subprocess
 import sys
 import tempfile
-import time
 
 import program
 
@@ -99,10 +98,8 @@ def parent(process):
 
 def until(condition, what, seconds=90):
     """Waits for the condition; returns what it said."""
-    end = time.monotonic() + seconds
-    while not (said := condition()):
-        assert time.monotonic() < end, what() if callable(what) else what
-        time.sleep(0.05)
+    said = program.until(condition, seconds)
+    assert said, what() if callable(what) else what
     return said
 
 

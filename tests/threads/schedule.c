@@ -33,10 +33,7 @@ enum {
 // The control file; tests/threads/schedules.py writes the seed and reads the counts.
 typedef struct {
     _Atomic uint64_t seed;     // of the schedule; another one begins another schedule
-    _Atomic uint64_t points;   // calls at which another thread could have been chosen, of this
-                               // schedule as all that follow
-    _Atomic uint64_t switches; // at which another one was chosen
-    _Atomic uint64_t taken;    // turns taken from threads that made no call
+    _Atomic uint64_t switches; // of this schedule: calls at which another thread was chosen
     _Atomic uint64_t digest;   // of the order of threads
 } Control;
 
@@ -188,10 +185,8 @@ static void turn_wait(Thread *thread) {
     if (running == NULL)
         turn_give(thread_first_ready());
     while (running != thread)
-        if (next.cond_timedwait(&thread->turn, &lock, &end) == ETIMEDOUT && running != thread) {
-            atomic_fetch_add(&control->taken, 1);
+        if (next.cond_timedwait(&thread->turn, &lock, &end) == ETIMEDOUT && running != thread)
             running = thread;
-        }
     thread->state = THREAD_RUNNING;
 }
 
@@ -216,7 +211,6 @@ static void point(void) {
     Thread *thread = thread_self();
     if (thread != NULL) {
         seed_read();
-        atomic_fetch_add(&control->points, 1);
         if (draw() % rate == 0)
             thread->priority = draw();
         if (draw() % stop_rate == 0)
