@@ -2,7 +2,6 @@
 """An optimisation as its user meets it: the answer in all formats, and the best scene, which runs to the same numbers."""
 
 import io
-import json
 import os
 import sys
 import xml.etree.ElementTree as tree
