@@ -120,7 +120,7 @@ static const struct {
             KEPT("Accept-Encoding", accept_encoding, false),
             KEPT("Content-Encoding", content_encoding, false),
             KEPT("If-Match", if_match, false),
-            KEPT("Idempotency-Key", idempotency_key, false),
+            KEPT("Idempotency-Key", idempotency_key, true),
             KEPT("Last-Event-ID", last_event_id, false),
             KEPT("Access-Control-Request-Method", preflight, false),
             KEPT("Content-Length", content_length, true),
