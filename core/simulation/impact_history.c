@@ -69,8 +69,8 @@ static Status impact_run_settle(ImpactRun *run, const Simulation *asked,
     if (limits != NULL && limits->bytes > 0 && !(bytes <= limits->bytes))
         return problem_set(problem, STATUS_LIMIT,
                            "the run is too long, or has too many storeys, to show one impact in "
-                           "detail: with all its states it would take about %.3g MB of memory, at "
-                           "most %.4g MB are allowed; submit a shorter scene that contains the "
+                           "detail. With all its states it would take about %.3g MB of memory, at "
+                           "most %.4g MB are allowed. Submit a shorter scene that contains the "
                            "impact",
                            1e-6 * bytes, 1e-6 * limits->bytes);
     return STATUS_OK;

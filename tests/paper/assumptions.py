@@ -1,7 +1,7 @@
 """What the paper leaves open, what is taken here, and what another choice would change.
 
 Each entry varies one thing and tells how far the two models' spectra then lie apart, bare aluminium against sponge:
-the paper's thesis stands where the first stays small and the second large. Used by reproduce.py."""
+the paper's thesis stands where the first stays small and the second large."""
 
 import numpy
 from scipy.signal import welch

@@ -1,6 +1,6 @@
 """One SVG of four panels, written line by line: Figures 5, 7 and 12 and where the two models part.
 
-Draws what it is given and measures nothing but the closed form of an isolated contact. Used by reproduce.py."""
+Draws what it is given and measures nothing but the closed form of an isolated contact."""
 
 import math
 

@@ -1,7 +1,7 @@
 """What is measured on runs, and what pen and paper say: distances between spectra, isolated contacts, the first touch.
 
 Knows no figures. Nothing here is taken from the program: the formulas are the paper's (equation numbers given) or
-derived in place. Used by all else here and by truth/test_paper.py."""
+derived in place."""
 
 import math
 

@@ -3,8 +3,7 @@
 A row's "holds" is computed from the criterion that it states. Rows that are "firm" are of motions that rounding cannot
 change; of the others another machine may find slightly different numbers. The experiments are not in the paper's text:
 where it says that a simulation matches one, what can be told is whether its two models agree. How closely they have to,
-a repeated test says: the same model with the ball or the release a little elsewhere. Used by free.py, forced.py,
-contact.py and reproduce.py."""
+a repeated test says: the same model with the ball or the release a little elsewhere."""
 
 import numpy
 

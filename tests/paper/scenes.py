@@ -1,6 +1,6 @@
 """Li and Darby's scenes and what `impactd run` answers to them.
 
-Judges nothing: measure.py measures, figures.py compares. Used by reproduce.py and by truth/test_paper.py."""
+Judges nothing: measure.py measures, rows.py compares."""
 
 import functools
 import json

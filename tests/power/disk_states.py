@@ -1,4 +1,4 @@
-"""What a disk may hold after a power failure, of what recorder.c wrote down. Used by power.py.
+"""What a disk may hold after a power failure, of what recorder.c wrote down.
 
 The model: a file's bytes are on the disk when the file was synced after they were written. Of what was not synced, any
 sector of 512 bytes may be there or not, in any combination, and so may a change of the file's size. Names of files are on

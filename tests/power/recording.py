@@ -1,4 +1,4 @@
-"""A daemon under recorder.c, what is asked of it, and what it acknowledged when. Used by power.py.
+"""A daemon under recorder.c, what is asked of it, and what it acknowledged when.
 
 An acknowledgement is what has to be there from one place of the record on: rows of the database, or a target with its
 bytes. It ends where a later request that changes the same thing begins."""

@@ -1,4 +1,4 @@
-"""Tokens for a daemon, and commands run beside it. Not the daemon itself: that is daemon.py. Used by the tests under contract/."""
+"""Tokens for a daemon, and commands run beside it. Not the daemon itself: that is daemon.py."""
 import os
 import re
 import subprocess

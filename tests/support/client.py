@@ -1,6 +1,6 @@
 """The commands that ask a daemon, as a user runs them, and servers that are no impactd.
 
-Not the daemon itself: that is daemon.py. Used by contract/test_client.py and contract/test_materials_command.py."""
+Not the daemon itself: that is daemon.py."""
 
 import contextlib
 import http.server

@@ -4,7 +4,7 @@
         reply = daemon.request("POST", "/v1/jobs", json={...})
 
 With IMPACTD_RECORD=FILE in the environment every request and its answer is one line of JSON in that file.
-Standard library only. Not a client for users. Used by the tests under contract/ and truth/.
+Standard library only. Not a client for users.
 """
 import base64
 import contextlib

@@ -1,6 +1,6 @@
 """A small disk of its own for a test, and a way to fill it.
 
-Not for tests that only need a folder. Used by contract/test_full_disk.py and contract/test_backup.py."""
+Not for tests that only need a folder."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""A made-up laboratory's materials, as documents and tables. Not the daemon. Used by the tests of export and import."""
+"""A made-up laboratory's materials, as documents and tables. Not the daemon."""
 import csv
 import io
 import json

@@ -1,7 +1,7 @@
 """What the Python tests share: where the program is, how to run it, what a test file does as a whole.
 
 Not a test framework: a test is a function whose name begins with test_ and whose first line of
-documentation is the sentence it proves. Used by every tests/**/test_*.py."""
+documentation is the sentence it proves."""
 
 import argparse
 import contextlib

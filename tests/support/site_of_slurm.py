@@ -1,7 +1,5 @@
 """A Slurm with a shared folder and a data folder, for tests of studies on a cluster: what threads answer, what the cluster
-answers, and that nothing is left behind.
-
-Used by contract/test_slurm.py and test_slurm_drills.py."""
+answers, and that nothing is left behind."""
 
 import contextlib
 import functools

@@ -3,7 +3,7 @@
     with Slurm() as slurm, program.daemon(*slurm.options(shared), environment=slurm.environment) as daemon: ...
 
 No part of the system's Slurm is touched: the configuration, the key of munge and the ports are its own. The daemons run in
-the foreground as children, as root or as an ordinary user. Used by contract/test_slurm*.py and bench/bench_slurm.py."""
+the foreground as children, as root or as an ordinary user."""
 
 import contextlib
 import getpass
