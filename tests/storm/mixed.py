@@ -158,8 +158,8 @@ class Storm:
         return sorted(memory[-3:])[1] - max(memory[:4]), max(files[-3:]) - max(files[:4])
 
     def typical_growth(self):
-        """The median over the lives."""
-        return sorted(self.growth(life)[0] for life in range(self.lives))[(self.lives - 1) // 2]
+        """The medians over the lives."""
+        return [sorted(of)[(self.lives - 1) // 2] for of in zip(*(self.growth(life) for life in range(self.lives)))]
 
     def growth_over_lives(self):
         """The same from the first third of the lives to the last one."""
@@ -168,10 +168,11 @@ class Storm:
         return memory[-1] - max(memory[:first]), files[-1] - max(files[:first])
 
     def is_flat(self):
-        """What leaks grows in every life. One may take some more for its caches, but the last life no more than the first ones."""
-        within = [self.growth(life) for life in range(self.lives)]
+        """What leaks grows in every life. One may take some more for its caches and for connections to the database, but the
+        last life no more than the first ones."""
+        memory, files = self.typical_growth()
         more, opened = self.growth_over_lives()
-        return self.typical_growth() < GROWTH and more < DIFFERENCE and max(opened, *(files for _, files in within)) <= OPENED
+        return memory < GROWTH and more < DIFFERENCE and max(opened, files) <= OPENED
 
     def unmet(self):
         """What no client asked, and each of them if none was checked after a restart."""
@@ -200,11 +201,12 @@ def main():
             storm.run()
             took = time.monotonic() - begin
         lost, doubled = storm.lost()
+    within, later = storm.typical_growth(), storm.growth_over_lives()
     for (what, code), count in sorted(storm.codes.items(), key=str):
         print(f"{what:10} {code}  {count}")
     print(f"{sum(storm.codes.values())} requests in {took:.0f} s, {storm.victims} clients killed, {arguments.restarts} restarts; "
           f"{len(storm.acknowledged)} jobs acknowledged, {storm.checked} checked after restarts: {lost} lost, {doubled} duplicated; "
-          f"{storm.typical_growth() / 2**20:.1f} MiB more within a life (median), {storm.growth_over_lives()[0] / 2**20:.1f} MiB from life to life")
+          f"{within[0] / 2**20:.1f} MiB and {within[1]} descriptors more within a life (median), {later[0] / 2**20:.1f} MiB and {later[1]} from life to life")
     return 0 if storm.is_flat() and not lost and not doubled and not storm.unmet() else 1
 
 
