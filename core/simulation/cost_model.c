@@ -217,13 +217,15 @@ static CostContacts cost_contact(const Damper *damper, Side side, ContactForm fo
                            : buffer->contact_time > 0 ? half / buffer->contact_time
                            : buffer->stiffness > 0    ? sqrt(buffer->stiffness / damper->mass)
                                                       : 0;
-    const double speed = fmin(crossing * crossing / 2, 2);               // of approach
-    const double first = 2 * speed * e, all = EARLIER * first / (1 - e); // time of bounces
-    const double room = fmax(half - crossing, 0);
+    const double speed = fmin(crossing * crossing / 2, 2); // of approach
+    // A bounce takes longer than a contact, or the mass stays in contact.
     const double slowest = contact > 0 ? motion->rate / contact : SLOWEST_BOUNCE;
+    const double room = fmax(half - crossing, 0);
+    const double first = EARLIER * 2 * speed * e / (1 - e); // time of all bounces
+    const double all = first * fmax(1 - slowest / speed, 0);
     double bounces = speed > slowest ? log(speed / slowest) / -log(e) : 0;
     if (all > room)
-        bounces = fmin(bounces, first > 0 ? log(1 - room / all) / log(e) : 0);
+        bounces = fmin(bounces, log(1 - room / first) / log(e));
     const double halves = motion->rate * motion->lasts / half;
     const double impacts = halves * (1 + fmin(bounces, BOUNCES_MAX)) / 2;
     const double pressed = fmax(room - all, 0) / half * motion->lasts;
