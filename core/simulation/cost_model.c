@@ -228,8 +228,9 @@ static CostContacts cost_contact(const Damper *damper, Side side, ContactForm fo
         bounces = fmin(bounces, log(1 - room / first) / log(e));
     const double halves = motion->rate * motion->lasts / half;
     const double impacts = halves * (1 + fmin(bounces, BOUNCES_MAX)) / 2;
-    const double pressed = fmax(room - all, 0) / half * motion->lasts;
     const double touched = contact > 0 ? impacts * half / contact : 0;
+    const double pressed =
+        fmax(fmin((room - all) / half * motion->lasts, motion->lasts - touched), 0);
     const double damped = form == CONTACT_POWER ? 1 + DAMPED * (1 / e - 1) : 1;
     return (CostContacts){.impacts = 2 * impacts,
                           .pressed = pressed,
