@@ -59,10 +59,15 @@ Status db_sweep_begin(Db *db, SweepRow *row, Problem *problem) {
 
 Status db_sweep_load(Db *db, const char *result, SweepRow *row, Problem *problem) {
     static const char sql[] = "SELECT {columns} FROM sweeps WHERE result = :id";
-    return db_get(db, sql, &(QueryKey){.id = result}, sweep_columns, row, sizeof *row, problem,
-                  "there is no table of \"%.72s\": either no such result, or its scene asked for "
-                  "no sweep",
-                  result);
+    TRY(db_get(db, sql, &(QueryKey){.id = result}, sweep_columns, row, sizeof *row, problem,
+               "there is no table of \"%.72s\": either no such result, or its scene asked for "
+               "no sweep",
+               result));
+    if (row->chunks > 0)
+        return STATUS_OK;
+    sweep_row_clear(row);
+    return problem_set(problem, STATUS_INTERNAL,
+                       "the database is damaged: the table of %.72s has no parts", result);
 }
 
 Status db_sweep_asked(Db *db, const char *job, SweepRow *row, Problem *problem) {
