@@ -581,9 +581,12 @@ TEST(running_jobs_share_one_budget_of_memory) {
     for (size_t i = 0; i < 3; i++) { // in turn, whether they run or wait
         JobView now = show(jobs[i]);
         Job *cancelled;
-        assert_int_equal(jobs_cancel(room.manager, now.row.id, &cancelled, &problem), STATUS_OK);
-        assert_int_equal(wait_until_kept(cancelled, &problem), STATUS_OK);
-        job_unref(cancelled);
+        if (jobs_cancel(room.manager, now.row.id, &cancelled, &problem) == STATUS_OK) {
+            assert_int_equal(wait_until_kept(cancelled, &problem), STATUS_OK);
+            job_unref(cancelled);
+        } else {
+            assert_true(job_is_finished(jobs[i])); // while a slow disk kept us waiting
+        }
         job_view_clear(&now);
         job_unref(jobs[i]);
         Job *small = submit(&room, 0.1 + 0.001 * (double)i, 0.1); // it is not counted
@@ -591,9 +594,9 @@ TEST(running_jobs_share_one_budget_of_memory) {
         job_unref(small);
         for (int k = 0; i < 2 && k < 60000; k++) {
             now = show(jobs[i + 1]);
-            const bool is_running = now.row.state == JOB_RUNNING;
+            const bool has_begun = now.row.state != JOB_ACCEPTED;
             job_view_clear(&now);
-            if (is_running)
+            if (has_begun)
                 break;
             nanosleep(&moment, NULL);
             assert_true(k < 59999);
