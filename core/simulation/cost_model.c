@@ -43,6 +43,8 @@ static const double EARLIER = 0.7; // bounces end so, over those of the largest 
 static const double RINGING = 17;  // -log of the part of a contact's motion that is seen
 // Steps for a radian of a contact's motion, under linear and power laws.
 static const double HELD_ARCS = 1.2, HELD_POWER = 0.5;
+// Of more modes steps in contact have few lengths (core/solve/sustained_contact.c).
+enum { FEW_MODES = 24 };
 static const double RINGING_ARC = 2;  // with a long step tried in vain, over an arc
 static const double EASY_STEP = 0.4;  // over a sample of an impact, over others under a power law
 static const double DAMPED = 0.3;     // steps of a damped power law, per (1 - e) / e
@@ -345,9 +347,10 @@ static double cost_exact_steps(const Simulation *simulation, const StructureRate
     const double closed = RINGING_ARC * HELD_ARCS * work->ringing +
                           HELD_SAMPLE / arc * (1 + HELD_RADIAN * fast) * held;
     const double open = HELD_ARCS * work->radians;
-    // Where the structure is fast it may excite the contact for ever: something between the two.
+    // A fast structure may excite the contact for ever: for many modes the lengths of the steps are
+    // too long then, for few it is something between the two.
     if (form == CONTACT_LINEAR && m == 1 && closed < open)
-        arcs += fmax(fast < 1 ? closed : sqrt(closed * open), held);
+        arcs += fmax(fast < 1 ? closed : n > FEW_MODES ? open : sqrt(closed * open), held);
     else if (form == CONTACT_LINEAR)
         arcs += fmax(open, held);
     else if (form == CONTACT_IMPULSIVE)
