@@ -36,6 +36,17 @@ test("A run is followed though the service was lost right after its first answer
   await says(main(page), /Cancelled/);
 });
 
+test("A page of comparisons that is being left does not come back when its list comes", async ({ page, daemon, url }) => {
+  for (const duration of [1, 2]) await daemon.run({ ...(await daemon.example("paper_free_sponge")), duration });
+  const list = await hold(page, /\/v1\/jobs\?.*details=1/);
+  await page.goto(url("#/compare"));
+  await list.asked();
+  // As the way back does, a moment before the page hears of it.
+  await page.evaluate(() => history.replaceState(null, "", "#/records"));
+  await list.letGo();
+  assert.match(page.url(), /#\/records$/);
+});
+
 test("A search that another page overtook does not come back", async ({ page, url }) => {
   await page.goto(url("#/records"));
   await heading(page, "Ground motions").waitFor();

@@ -76,10 +76,11 @@ function ComparePage({ address }) {
     (signal) => (ids.length > 1 ? loadComparison(ids, signal) : { runs: [] }),
     [ids.join()],
   );
-  // Without any named the last two are compared.
+  // Without any named the last two are compared, unless the reader has just gone to another page.
   useEffect(() => {
     const [b, a] = known.data?.keys() ?? [];
-    if (a && idsOf(read().query).length === 0) replace("compare", { a, b });
+    const { path, query: now } = read();
+    if (a && path[0] === "compare" && idsOf(now).length === 0) replace("compare", { a, b });
   }, [known.data, address]);
   const isCurrent = !loaded.isLoading && loaded.data?.runs.length === ids.length;
   const labels = isCurrent ? loaded.data.runs.map(({ label }) => label) : [];
