@@ -43,9 +43,9 @@ static const double EARLIER = 0.7; // bounces end so, over those of the largest 
 static const double RINGING = 17;  // -log of the part of a contact's motion that is seen
 // Steps for a radian of a contact's motion, under linear and power laws.
 static const double HELD_ARCS = 1.2, HELD_POWER = 0.5;
+static const double RINGING_ARC = 2; // with a long step tried in vain, over an arc
 // Of more modes steps in contact have few lengths (core/solve/sustained_contact.c).
 enum { FEW_MODES = 24 };
-static const double RINGING_ARC = 2;  // with a long step tried in vain, over an arc
 static const double EASY_STEP = 0.4;  // over a sample of an impact, over others under a power law
 static const double DAMPED = 0.3;     // steps of a damped power law, per (1 - e) / e
 static const double POWER_STEPS = 12; // of a contact under a power law

@@ -16,7 +16,6 @@ class Campaign:
         self.kind = kind
         self.calls, self.error = KINDS.get(kind, (ALLOCATIONS, 0))
         self.tried, self.outcomes, self.wrong = 0, collections.Counter(), []
-
         self.chosen = slice(first - 1, last, stride)
 
     def fault(self, what, text):
